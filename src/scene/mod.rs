@@ -1,0 +1,148 @@
+//! The compiled scene: flat arrays and typed ids, the only thing the two passes see.
+//!
+//! A scene file is first read into a [`file::SceneFile`] (exactly what the JSON says), then
+//! [`compile`]d into a [`Scene`]. Rendering never changes it.
+
+mod camera;
+mod light;
+mod material;
+
+pub use camera::Camera;
+pub use light::{Light, QuadLight};
+pub use material::{Material, Texture};
+
+use crate::geometry::Geometry;
+use glam::Vec3;
+
+macro_rules! typed_id {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub struct $name(pub u32);
+        impl $name {
+            /// The id as an index into its array.
+            #[inline]
+            #[must_use]
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+    };
+}
+
+typed_id!(
+    /// Index into [`Scene::objects`].
+    ObjectId
+);
+typed_id!(
+    /// Index into [`Scene::materials`].
+    MaterialId
+);
+typed_id!(
+    /// Index into [`Scene::lights`].
+    LightId
+);
+
+/// Everything a render needs, in flat arrays.
+#[derive(Debug)]
+pub struct Scene {
+    /// The scene's own name, for reports only.
+    pub name: String,
+    /// Size and tone of the picture.
+    pub image: ImageSettings,
+    /// Where the eye is.
+    pub camera: Camera,
+    /// All materials; [`Object::material`] points here.
+    pub materials: Vec<Material>,
+    /// All objects; each primitive of [`Scene::geometry`] belongs to one.
+    pub objects: Vec<Object>,
+    /// Primitives and the structure that finds the nearest.
+    pub geometry: Geometry,
+    /// All lights but the environment.
+    pub lights: Vec<Light>,
+    /// Radiance of the constant environment, W·sr⁻¹·m⁻².
+    pub environment: Vec3,
+    /// What the file asks of the renderer.
+    pub render: RenderSettings,
+}
+
+/// One named thing of the scene file (or the surface of a light).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Object {
+    /// Name, for reports only.
+    pub name: String,
+    /// What it is made of.
+    pub material: MaterialId,
+    /// The light whose surface this is, if it emits.
+    pub emitter: Option<LightId>,
+}
+
+/// Size and tone of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageSettings {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Exposure in stops: the picture is multiplied by 2^exposure before it is encoded.
+    pub exposure: f32,
+    /// Curve between linear radiance and the display.
+    pub tone: Tone,
+}
+
+/// Curve between linear radiance and the display's 0..1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Tone {
+    /// Clip at 1.
+    #[default]
+    Linear,
+    /// The ACES-like filmic fit of Narkowicz (2015): rolls highlights off.
+    Filmic,
+}
+
+/// Which light paths are computed: the choice of method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Paths {
+    /// `LS*E|LDS*E`: the recursive ray tracing of Whitted (1980), without caustics.
+    Whitted,
+    /// `LS*E|LDS*E|LS+DS*E`: the two passes.
+    #[default]
+    Caustics,
+}
+
+/// What the scene file asks of the renderer.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct RenderSettings {
+    /// Which light paths are computed.
+    pub paths: Paths,
+    /// When the render ends; the first limit reached ends it.
+    pub stop: Stop,
+    /// Seed of every random stream.
+    pub seed: u64,
+}
+
+/// When a render ends: the first limit that is reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    /// Estimated relative error of the picture (see [`crate::error_estimate`]).
+    pub error: Option<f32>,
+    /// Seconds of wall-clock time spent rendering.
+    pub seconds: Option<f64>,
+    /// Number of rounds.
+    pub rounds: Option<u32>,
+}
+
+impl Default for Stop {
+    fn default() -> Self {
+        Self { error: Some(0.02), seconds: Some(60.0), rounds: None }
+    }
+}
+
+impl Scene {
+    /// The material of an object.
+    #[inline]
+    #[must_use]
+    pub fn material_of(&self, object: ObjectId) -> &Material {
+        &self.materials[self.objects[object.index()].material.index()]
+    }
+}
