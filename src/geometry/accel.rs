@@ -4,7 +4,7 @@ use super::{Bounds, Ray};
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh};
 use obvhs::ray::{Ray as BvhRay, RayHit};
-use obvhs::{BvhBuildParams, Boundable};
+use obvhs::{Boundable, BvhBuildParams};
 use std::time::Duration;
 
 /// Up to this many primitives are simply tested one after the other. Measured on spheres and polygons: the
@@ -70,9 +70,14 @@ impl Accel {
     pub(super) fn any(&self, ray: &Ray, t_max: f32, mut test: impl FnMut(usize) -> bool) -> bool {
         match self {
             Self::List(count) => (0..*count).any(test),
-            Self::Bvh(bvh) => !bvh.ray_traverse_miss(bvh_ray(ray, t_max), |_, slot| {
-                if test(slot) { 0.0 } else { f32::INFINITY }
-            }),
+            Self::Bvh(bvh) => {
+                !bvh.ray_traverse_miss(
+                    bvh_ray(ray, t_max),
+                    |_, slot| {
+                        if test(slot) { 0.0 } else { f32::INFINITY }
+                    },
+                )
+            }
         }
     }
 

@@ -19,11 +19,11 @@ pub struct MeshData {
 
 /// The corners of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Triangle(pub(super) [Vec3; 3]);
+pub(super) struct Triangle(pub(super) [Vec3; 3]);
 
 /// What is interpolated over a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TriangleShading {
+pub(super) struct TriangleShading {
     pub(super) normals: Option<[Vec3; 3]>,
     pub(super) uvs: [Vec2; 3],
 }
@@ -74,9 +74,8 @@ impl Triangle {
         let mut w = b.x * a.y - b.y * a.x;
         if u == 0.0 || v == 0.0 || w == 0.0 {
             // On an edge in f32: decide in f64, where the products are exact.
-            let exact = |p: Vec3, q: Vec3| {
-                (f64::from(p.x) * f64::from(q.y) - f64::from(p.y) * f64::from(q.x)) as f32
-            };
+            let exact =
+                |p: Vec3, q: Vec3| (f64::from(p.x) * f64::from(q.y) - f64::from(p.y) * f64::from(q.x)) as f32;
             (u, v, w) = (exact(c, b), exact(a, c), exact(b, a));
         }
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {

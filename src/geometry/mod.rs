@@ -78,6 +78,19 @@ pub struct Hit {
     pub sheet: SheetId,
 }
 
+/// A point, or a sphere around it, of an object's hull.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HullPoint {
+    /// Its position.
+    pub position: Vec3,
+    /// Radius of the sphere; 0 for a point.
+    pub radius: f32,
+}
+
+fn point(position: &Vec3) -> HullPoint {
+    HullPoint { position: *position, radius: 0.0 }
+}
+
 /// Names a polygon, a sphere or a mesh as one sheet of surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SheetId(pub u32);
@@ -151,6 +164,23 @@ impl Geometry {
         self.object_bounds.get(object.index()).copied().unwrap_or(Bounds::EMPTY)
     }
 
+    /// Points and spheres whose convex hull holds the object.
+    #[must_use]
+    pub fn hull(&self, object: ObjectId) -> Vec<HullPoint> {
+        let mut hull = Vec::new();
+        for primitive in self.primitives.iter().filter(|p| p.object == object) {
+            match primitive.shape {
+                Shape::Sphere(i) => {
+                    let Sphere { center, radius } = self.spheres[i as usize];
+                    hull.push(HullPoint { position: center, radius });
+                }
+                Shape::Polygon(i) => hull.extend(self.polygons[i as usize].corners().iter().map(point)),
+                Shape::Triangle(i) => hull.extend(self.triangles[i as usize].0.iter().map(point)),
+            }
+        }
+        hull
+    }
+
     /// Box of everything.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
@@ -219,7 +249,8 @@ impl GeometryBuilder {
             let shape = Shape::Triangle(self.triangles.len() as u32);
             let corner = |k: usize| indices[k] as usize;
             self.triangles.push(Triangle(std::array::from_fn(|k| mesh.positions[corner(k)])));
-            let normals = (!mesh.normals.is_empty()).then(|| std::array::from_fn(|k| mesh.normals[corner(k)]));
+            let normals =
+                (!mesh.normals.is_empty()).then(|| std::array::from_fn(|k| mesh.normals[corner(k)]));
             let uvs = if mesh.uvs.is_empty() {
                 [Vec2::ZERO, Vec2::X, Vec2::Y]
             } else {

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 /// A planar polygon, concave or with holes. Its corners, projected along the normal's largest component,
 /// are a range of the scene's array of [`Edge`]s.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Polygon {
+pub(super) struct Polygon {
     /// Unit normal by the right-hand rule over the outline.
     normal: DVec3,
     /// The plane is `normal · p = offset`.
@@ -22,11 +22,13 @@ pub struct Polygon {
     /// Range of the polygon's edges.
     edges: std::ops::Range<u32>,
     bounds: Bounds,
+    /// Corners of the outline.
+    corners: Vec<Vec3>,
 }
 
 /// One edge of a polygon, projected.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub(super) struct Edge {
     from: DVec2,
     to: DVec2,
 }
@@ -59,7 +61,7 @@ impl Polygon {
     ///
     /// # Errors
     /// See [`PolygonError`].
-    pub fn new(outlines: &[Vec<Vec3>], edges: &mut Vec<Edge>) -> Result<Self, PolygonError> {
+    pub(super) fn new(outlines: &[Vec<Vec3>], edges: &mut Vec<Edge>) -> Result<Self, PolygonError> {
         let plane = Plane::of(outlines)?;
         let first = edges.len() as u32;
         for outline in outlines {
@@ -78,6 +80,7 @@ impl Polygon {
             origin,
             along: along.unwrap_or(DVec3::X),
             edges: first..edges.len() as u32,
+            corners: outline.clone(),
             bounds: Bounds::of(outlines.iter().flatten().copied()).padded(),
         })
     }
@@ -136,6 +139,10 @@ impl Polygon {
             shading_normal: normal,
             uv: Vec2::new(local.dot(self.along) as f32, local.dot(across) as f32),
         }
+    }
+
+    pub(super) fn corners(&self) -> &[Vec3] {
+        &self.corners
     }
 
     pub(super) fn bounds(&self) -> Bounds {

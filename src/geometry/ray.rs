@@ -39,11 +39,7 @@ pub fn offset_origin(point: Vec3, error: f32, normal: Vec3, direction: Vec3) -> 
     let distance = error * normal.abs().element_sum();
     let side = if direction.dot(normal) < 0.0 { -normal } else { normal };
     let moved = point + side * distance;
-    Vec3::new(
-        away(point.x, moved.x, side.x),
-        away(point.y, moved.y, side.y),
-        away(point.z, moved.z, side.z),
-    )
+    Vec3::new(away(point.x, moved.x, side.x), away(point.y, moved.y, side.y), away(point.z, moved.z, side.z))
 }
 
 /// Rounds `moved` one step further along `side`, so that rounding the sum cannot undo the move.

@@ -6,11 +6,11 @@ use glam::{DVec3, Vec2, Vec3};
 
 /// A sphere; its normal points outwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sphere {
+pub(super) struct Sphere {
     /// Centre.
-    pub center: Vec3,
+    pub(super) center: Vec3,
     /// Radius, positive.
-    pub radius: f32,
+    pub(super) radius: f32,
 }
 
 impl Sphere {
