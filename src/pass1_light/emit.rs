@@ -62,23 +62,25 @@ impl<'a> Emission<'a> {
     pub fn sample(&self, sample: SamplePoint) -> Option<EmittedPhoton> {
         let through = sample.get_2d(0);
         let photon = match &self.source {
-            Sampler::Environment(radiance) => self.from_environment(*radiance, through, sample.get_2d(2)),
+            Sampler::Environment(radiance) => {
+                self.emit_from_environment(*radiance, through, sample.get_2d(2))
+            }
             Sampler::Light(Light::Directional { direction, irradiance }) => {
-                self.from_afar(*direction, *irradiance, through)
+                self.emit_from_afar(*direction, *irradiance, through)
             }
             Sampler::Light(Light::Point { position, intensity }) => {
                 let origin = Origin { point: *position, strength: *intensity, normal: None };
-                self.from_point(&origin, through)
+                self.emit_from_point(&origin, through)
             }
             Sampler::Light(Light::Quad(quad)) => {
-                self.from_point(&point_on_quad(quad, sample.get_2d(2)), through)
+                self.emit_from_point(&point_on_quad(quad, sample.get_2d(2)), through)
             }
         }?;
         (photon.power.max_element() > 0.0).then_some(photon)
     }
 
     /// From a point through the window, or in any direction.
-    fn from_point(&self, origin: &Origin, through: Vec2) -> Option<EmittedPhoton> {
+    fn emit_from_point(&self, origin: &Origin, through: Vec2) -> Option<EmittedPhoton> {
         let (direction, solid_angle) = match &self.window.region {
             Region::Rectangle { corner, u, v } => {
                 let to = *corner + *u * through.x + *v * through.y - origin.point;
@@ -103,7 +105,7 @@ impl<'a> Emission<'a> {
     }
 
     /// Parallel light through a rectangle perpendicular to it.
-    fn from_afar(&self, direction: Vec3, irradiance: Vec3, through: Vec2) -> Option<EmittedPhoton> {
+    fn emit_from_afar(&self, direction: Vec3, irradiance: Vec3, through: Vec2) -> Option<EmittedPhoton> {
         let Region::Rectangle { corner, u, v } = &self.window.region else { return None };
         let target = *corner + *u * through.x + *v * through.y;
         let ray = Ray::new(target - direction * self.retreat, direction);
@@ -111,7 +113,7 @@ impl<'a> Emission<'a> {
     }
 
     /// From all around toward a sphere that holds the caster.
-    fn from_environment(&self, radiance: Vec3, through: Vec2, u: Vec2) -> Option<EmittedPhoton> {
+    fn emit_from_environment(&self, radiance: Vec3, through: Vec2, u: Vec2) -> Option<EmittedPhoton> {
         let Region::Disc { center, radius } = self.window.region else { return None };
         let direction = uniform_sphere(u);
         let (x, y) = direction.any_orthonormal_pair();

@@ -56,6 +56,9 @@ pub(super) struct EyeWalk<'a> {
     context: &'a EyeContext<'a>,
     spread: f32,
     stack: Vec<Branch>,
+    /// The eye sample that is being followed.
+    half: usize,
+    sample: SamplePoint,
     pub(super) counts: EyeCounts,
 }
 
@@ -74,20 +77,22 @@ struct Branch {
 impl<'a> EyeWalk<'a> {
     pub(super) fn new(context: &'a EyeContext<'a>) -> Self {
         let spread = context.scene.camera.pixel_spread();
-        Self { context, spread, stack: Vec::new(), counts: EyeCounts::default() }
+        let sample = SamplePoint::new(0, 0);
+        Self { context, spread, stack: Vec::new(), half: 0, sample, counts: EyeCounts::default() }
     }
 
     /// Adds what arrives along one eye ray to the classes' sums.
     pub(super) fn trace(&mut self, raster: Vec2, half: usize, sample: SamplePoint, sums: &mut ClassSums) {
         let ray = self.context.scene.camera.ray(raster);
+        (self.half, self.sample) = (half, sample);
         self.stack.clear();
         self.stack.push(Branch { ray, throughput: Vec3::ONE, bounces: 0, travelled: 0.0, key: 1 });
         while let Some(branch) = self.stack.pop() {
-            self.follow(branch, half, sample, sums);
+            self.follow(branch, sums);
         }
     }
 
-    fn follow(&mut self, branch: Branch, half: usize, sample: SamplePoint, sums: &mut ClassSums) {
+    fn follow(&mut self, branch: Branch, sums: &mut ClassSums) {
         let scene = self.context.scene;
         self.counts.eye_rays += 1;
         let Some(hit) = scene.geometry.closest_hit(&branch.ray) else {
@@ -95,20 +100,20 @@ impl<'a> EyeWalk<'a> {
             return;
         };
         match scene.material_of(hit.object) {
-            Material::Diffuse { albedo } => self.arrive(&branch, &hit, albedo, half, sample, sums),
+            Material::Diffuse { albedo } => self.arrive(&branch, &hit, albedo, sums),
             Material::Mirror { reflectance } => {
                 let interaction = optics::mirror(branch.ray.direction, &hit.surface, *reflectance);
-                self.scatter(&branch, &hit, &interaction, sample);
+                self.scatter(&branch, &hit, &interaction);
             }
             Material::Glass { ior } => {
                 let interaction = optics::glass(branch.ray.direction, &hit.surface, *ior);
-                self.scatter(&branch, &hit, &interaction, sample);
+                self.scatter(&branch, &hit, &interaction);
             }
         }
     }
 
     /// Puts the ways that leave an S onto the stack.
-    fn scatter(&mut self, branch: &Branch, hit: &Hit, interaction: &Interaction, sample: SamplePoint) {
+    fn scatter(&mut self, branch: &Branch, hit: &Hit, interaction: &Interaction) {
         if branch.bounces >= MAX_BOUNCES {
             self.counts.cut += 1;
             return;
@@ -118,26 +123,26 @@ impl<'a> EyeWalk<'a> {
             (Some(a), Some(b)) => {
                 let weight = |o: &Outcome| (branch.throughput * o.fraction).max_element();
                 if weight(&a).min(weight(&b)) >= SPLIT_ABOVE {
-                    self.push(branch, hit, &b, 1.0, sample);
-                    self.push(branch, hit, &a, 1.0, sample);
+                    self.push(branch, hit, &b, 1.0);
+                    self.push(branch, hit, &a, 1.0);
                     return;
                 }
                 let share = weight(&a) / (weight(&a) + weight(&b));
-                let u = sample.branch(branch.key).get(dimension);
+                let u = self.sample.branch(branch.key).get(dimension);
                 let (outcome, probability) = if u < share { (a, share) } else { (b, 1.0 - share) };
-                self.push(branch, hit, &outcome, probability, sample);
+                self.push(branch, hit, &outcome, probability);
             }
-            (Some(only), None) | (None, Some(only)) => self.push(branch, hit, &only, 1.0, sample),
+            (Some(only), None) | (None, Some(only)) => self.push(branch, hit, &only, 1.0),
             (None, None) => {}
         }
     }
 
-    fn push(&mut self, branch: &Branch, hit: &Hit, outcome: &Outcome, probability: f32, sample: SamplePoint) {
+    fn push(&mut self, branch: &Branch, hit: &Hit, outcome: &Outcome, probability: f32) {
         let mut throughput = branch.throughput * outcome.fraction * (outcome.radiance_scale / probability);
         let strength = throughput.max_element();
         if strength < ROULETTE_BELOW {
             let survival = strength / ROULETTE_BELOW;
-            let u = sample.branch(branch.key).get(FIRST_EVENT_DIMENSION + 2 * branch.bounces + 1);
+            let u = self.sample.branch(branch.key).get(FIRST_EVENT_DIMENSION + 2 * branch.bounces + 1);
             if u >= survival {
                 return;
             }
@@ -156,15 +161,7 @@ impl<'a> EyeWalk<'a> {
     }
 
     /// At a D: what it emits, the direct light and the photons.
-    fn arrive(
-        &mut self,
-        branch: &Branch,
-        hit: &Hit,
-        albedo: &Texture,
-        half: usize,
-        sample: SamplePoint,
-        sums: &mut ClassSums,
-    ) {
+    fn arrive(&mut self, branch: &Branch, hit: &Hit, albedo: &Texture, sums: &mut ClassSums) {
         let scene = self.context.scene;
         let backside = branch.ray.direction.dot(hit.surface.normal) > 0.0;
         if let Some(light) = scene.objects[hit.object.index()].emitter
@@ -181,14 +178,14 @@ impl<'a> EyeWalk<'a> {
         let weight = branch.throughput * albedo / std::f32::consts::PI;
         let normal = if backside { -hit.surface.normal } else { hit.surface.normal };
         let receiver = Receiver { surface: &hit.surface, normal };
-        let sample = sample.branch(branch.key);
+        let sample = self.sample.branch(branch.key);
         let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
         sums.add(PathClass::Direct, weight * direct);
         if let Some(photons) = self.context.photons {
             let radius = self.kernel_radius(branch, hit);
             let lookup = Lookup { point: hit.surface.point, normal, sheet: hit.sheet, radius };
             self.counts.lookups += 1;
-            let caustic = photons.maps[half].irradiance(&lookup).value;
+            let caustic = photons.maps[self.half].irradiance(&lookup).value;
             if caustic != Vec3::ZERO {
                 let mass = scene.geometry.kernel_mass(hit.sheet, hit.surface.point, radius);
                 sums.add(PathClass::Caustic, weight * caustic / mass);
