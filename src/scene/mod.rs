@@ -1,13 +1,22 @@
 //! The compiled scene: flat arrays and typed ids, the only thing the two passes see.
 //!
-//! A scene file is first read into a [`file::SceneFile`] (exactly what the JSON says), then
-//! [`compile`]d into a [`Scene`]. Rendering never changes it.
+//! A scene file is first read into a `SceneFile` (`file.rs`: exactly what the JSON says), then
+//! compiled into a [`Scene`] (`compile/`). Rendering never changes it.
 
+pub mod assets;
 mod camera;
+mod compile;
+mod file;
+mod issue;
+mod json;
 mod light;
 mod material;
+mod mesh_file;
+mod read;
 
+pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
 pub use camera::Camera;
+pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{Light, QuadLight};
 pub use material::{Material, Texture};
 
