@@ -1,12 +1,12 @@
-//! Pictures as linear radiance.
+//! Pictures in memory and in files.
 
-/// Linear radiance per pixel, top row first.
+/// A picture of linear radiance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearImage {
     /// Pixels across.
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Red, green and blue of each pixel.
+    /// Radiance per channel, top row first.
     pub pixels: Vec<[f32; 3]>,
 }
