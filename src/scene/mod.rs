@@ -133,7 +133,7 @@ pub struct RenderSettings {
 /// When a render ends: the first limit that is reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// Estimated relative error of the picture (see [`crate::error_estimate`]).
+    /// Estimated relative error of the picture (see [`crate::film::Film::error_estimate`]).
     pub error: Option<f32>,
     /// Seconds of wall-clock time spent rendering.
     pub seconds: Option<f64>,

@@ -29,7 +29,10 @@ impl Compiler<'_> {
                     let material = *surface.get_or_insert_with(|| self.black());
                     let name = format!("lights/{index}");
                     let object = self.add_object(Object { name, material, emitter: Some(id) });
-                    self.geometry.polygon(object, &[quad.corners().to_vec()]);
+                    if let Err(error) = self.geometry.polygon(object, &[quad.corners().to_vec()]) {
+                        let message = format!("too small for its distance from the origin: {error}");
+                        self.issues.add(format!("/lights/{index}/size"), IssueCode::Degenerate, message);
+                    }
                     self.lights.push(Light::Quad(quad));
                 }
             }

@@ -170,9 +170,7 @@ impl<'f> Compiler<'f> {
                 self.geometry.sphere(object, vec3(sphere.center), sphere.radius as f32)
             }
             ShapeFile::Polygon(polygon) => {
-                if polygon::check(polygon, pointer, self.issues) {
-                    self.geometry.polygon(object, &polygon::outlines(polygon));
-                }
+                polygon::add(polygon, object, &mut self.geometry, pointer, self.issues);
             }
             ShapeFile::Mesh(mesh) => {
                 if let Some(mesh) = self.meshes.load(mesh, pointer, self.issues) {

@@ -1,93 +1,60 @@
-//! Checks of polygons: planar, and with an area.
+//! Polygons of the scene file. Whether one has an area and is planar is for the geometry to say, which
+//! knows what it can intersect; here its answer becomes an issue with a pointer.
 
+use super::super::ObjectId;
 use super::super::file::PolygonFile;
 use super::super::issue::{IssueCode, Issues};
 use super::vec3;
+use crate::geometry::{GeometryBuilder, PolygonError};
 use glam::{DVec3, Vec3};
 
-/// Largest distance of a vertex from the plane, as a fraction of the polygon's extent.
-const MAX_UNEVENNESS: f64 = 1e-4;
-/// Least area, as a fraction of the squared extent: below it floats do not tell its sides apart.
-const MIN_AREA: f64 = 1e-7;
-
-/// The outline and then the holes.
-pub(super) fn outlines(polygon: &PolygonFile) -> Vec<Vec<Vec3>> {
-    std::iter::once(&polygon.vertices)
+/// Adds a polygon to the geometry; if it cannot be rendered, why not is noted.
+pub(super) fn add(
+    polygon: &PolygonFile,
+    object: ObjectId,
+    geometry: &mut GeometryBuilder,
+    pointer: &str,
+    issues: &mut Issues,
+) {
+    let outlines: Vec<Vec<Vec3>> = std::iter::once(&polygon.vertices)
         .chain(&polygon.holes)
         .map(|outline| outline.iter().map(|v| vec3(*v)).collect())
-        .collect()
-}
-
-/// Whether the polygon can be rendered; if not, why not is noted.
-pub(super) fn check(polygon: &PolygonFile, pointer: &str, issues: &mut Issues) -> bool {
-    let before = issues.count();
-    let outline = Outline::of(&polygon.vertices);
-    let at = format!("{pointer}/vertices");
-    let Some(plane) = outline.plane() else {
-        let message = "the polygon has no area (or crosses itself so that its parts cancel)";
-        issues.add(at, IssueCode::Degenerate, message);
-        return false;
+        .collect();
+    for (index, hole) in outlines.iter().skip(1).enumerate() {
+        if !has_area(hole) {
+            issues.add(format!("{pointer}/holes/{index}"), IssueCode::Degenerate, "the hole has no area");
+        }
+    }
+    let Err(error) = geometry.polygon(object, &outlines) else { return };
+    let code = match error {
+        PolygonError::TooFewVertices(_) => IssueCode::WrongLength,
+        PolygonError::NoArea => IssueCode::Degenerate,
+        PolygonError::NotPlanar { .. } => IssueCode::NotPlanar,
     };
-    if !plane.holds(&polygon.vertices, &at, issues) {
-        return false;
-    }
-    for (index, hole) in polygon.holes.iter().enumerate() {
-        let at = format!("{pointer}/holes/{index}");
-        if Outline::of(hole).plane().is_none() {
-            issues.add(at, IssueCode::Degenerate, "the hole has no area");
-        } else {
-            plane.holds(hole, &at, issues);
+    issues.add(format!("{pointer}{}", place(&error, &outlines)), code, error.to_string());
+}
+
+/// Whether an outline encloses more than the rounding of its corners.
+fn has_area(outline: &[Vec3]) -> bool {
+    let Some(base) = outline.first().map(|p| p.as_dvec3()) else { return false };
+    let spokes = || outline.iter().map(|p| p.as_dvec3() - base);
+    let doubled_area: DVec3 = spokes().zip(spokes().skip(1)).map(|(a, b)| a.cross(b)).sum();
+    let size = spokes().map(|s| s.length()).fold(0.0, f64::max);
+    doubled_area.length() > size * size * 1e-9
+}
+
+/// Where the error is, below the polygon.
+fn place(error: &PolygonError, outlines: &[Vec<Vec3>]) -> String {
+    let PolygonError::NotPlanar { vertex, .. } = error else { return "/vertices".to_owned() };
+    let mut index = *vertex;
+    for (outline, corners) in outlines.iter().enumerate() {
+        if index < corners.len() {
+            return match outline.checked_sub(1) {
+                None => format!("/vertices/{index}"),
+                Some(hole) => format!("/holes/{hole}/{index}"),
+            };
         }
+        index -= corners.len();
     }
-    issues.count() == before
-}
-
-struct Outline {
-    center: DVec3,
-    extent: f64,
-    /// Normal of length twice the area (Newell).
-    doubled_area: DVec3,
-}
-
-struct Plane {
-    point: DVec3,
-    normal: DVec3,
-    tolerance: f64,
-}
-
-impl Outline {
-    fn of(vertices: &[[f64; 3]]) -> Self {
-        let points = || vertices.iter().map(|v| DVec3::from(*v));
-        let center = points().sum::<DVec3>() / vertices.len().max(1) as f64;
-        let extent = 2.0 * points().map(|p| p.distance(center)).fold(0.0, f64::max);
-        let next = points().cycle().skip(1);
-        let doubled_area = points().zip(next).map(|(a, b)| (a - center).cross(b - center)).sum();
-        Self { center, extent, doubled_area }
-    }
-
-    fn plane(&self) -> Option<Plane> {
-        if self.doubled_area.length() <= 2.0 * MIN_AREA * self.extent * self.extent {
-            return None;
-        }
-        let normal = self.doubled_area.try_normalize()?;
-        Some(Plane { point: self.center, normal, tolerance: MAX_UNEVENNESS * self.extent })
-    }
-}
-
-impl Plane {
-    /// Whether all vertices are in the plane; if not, this is noted.
-    fn holds(&self, vertices: &[[f64; 3]], pointer: &str, issues: &mut Issues) -> bool {
-        let off = vertices
-            .iter()
-            .map(|v| (DVec3::from(*v) - self.point).dot(self.normal).abs())
-            .fold(0.0, f64::max);
-        if off > self.tolerance {
-            let message = format!(
-                "not planar: a vertex is {off:.1e} m off the polygon's plane, {:.1e} m are allowed",
-                self.tolerance
-            );
-            issues.add(pointer, IssueCode::NotPlanar, message);
-        }
-        off <= self.tolerance
-    }
+    "/vertices".to_owned()
 }
