@@ -319,10 +319,10 @@ fn bad_assets_are_errors_at_the_field_that_names_them() {
 
 fn sample_scenes() -> Vec<(String, String)> {
     let mut scenes: Vec<(String, String)> = std::fs::read_dir("scenes")
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
+        .expect("the samples are in scenes/")
+        .map(|entry| entry.expect("a readable folder").path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "json"))
-        .map(|path| (path.display().to_string(), std::fs::read_to_string(&path).unwrap()))
+        .map(|path| (path.display().to_string(), std::fs::read_to_string(&path).expect("a text")))
         .collect();
     scenes.sort();
     scenes
