@@ -11,6 +11,8 @@ pub mod pass1_light;
 pub mod pass2_eye;
 pub mod photon_map;
 pub mod plan;
+pub mod radius;
 pub mod render;
+pub mod report;
 pub mod sampling;
 pub mod scene;

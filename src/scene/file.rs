@@ -2,6 +2,7 @@
 //!
 //! Each type here is the one declaration of its JSON: field names, types, limits, defaults.
 
+use crate::radius::RadiusRule;
 use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
 use super::read::{
@@ -273,9 +274,11 @@ record! {
     #[derive(Default)]
     RenderFile {
         /// Which light paths are computed.
-        paths: Paths = or(choice(vec![("whitted", Paths::Whitted), ("caustics", Paths::Caustics)]), Paths::Caustics),
+        paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
         /// When the render ends.
         stop: Option<StopFile> = optional(object::<StopFile>()),
+        /// Radius of the caustics' density estimate: a pixel, or shrinking from round to round.
+        radius: RadiusRule = or(choice(RadiusRule::NAMED.to_vec()), RadiusRule::Pixel),
         /// Seed of every random stream.
         seed: u64 = or(seed(), 0),
     }

@@ -21,7 +21,8 @@ pub use light::{Light, QuadLight};
 pub use material::{Material, Texture};
 
 use crate::geometry::Geometry;
-use glam::Vec3;
+use crate::radius::RadiusRule;
+use glam::{Vec2, Vec3};
 
 macro_rules! typed_id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -119,6 +120,25 @@ pub enum Paths {
     Caustics,
 }
 
+impl Paths {
+    /// Every value and its name.
+    pub const NAMED: [(&str, Self); 2] = [("whitted", Self::Whitted), ("caustics", Self::Caustics)];
+}
+
+/// A value of `paths` that does not exist.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not one of `whitted` (LS*E|LDS*E) and `caustics` (LS*E|LDS*E|LS+DS*E)")]
+pub struct UnknownPaths(String);
+
+impl std::str::FromStr for Paths {
+    type Err = UnknownPaths;
+
+    fn from_str(text: &str) -> Result<Self, UnknownPaths> {
+        let known = Self::NAMED.iter().find(|(name, _)| *name == text);
+        known.map(|(_, paths)| *paths).ok_or_else(|| UnknownPaths(text.to_owned()))
+    }
+}
+
 /// What the scene file asks of the renderer.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct RenderSettings {
@@ -126,6 +146,8 @@ pub struct RenderSettings {
     pub paths: Paths,
     /// When the render ends; the first limit reached ends it.
     pub stop: Stop,
+    /// Radius of the caustics' density estimate.
+    pub radius: RadiusRule,
     /// Seed of every random stream.
     pub seed: u64,
 }
@@ -148,6 +170,13 @@ impl Default for Stop {
 }
 
 impl Scene {
+    /// Renders at another size, with the same vertical field of view.
+    pub fn set_size(&mut self, width: u32, height: u32) {
+        self.image.width = width;
+        self.image.height = height;
+        self.camera.resolution = Vec2::new(width as f32, height as f32);
+    }
+
     /// The material of an object.
     #[inline]
     #[must_use]

@@ -192,7 +192,7 @@ impl<'f> Compiler<'f> {
                 Stop { error: error.map(|e| e as f32), seconds: *seconds, rounds: *rounds }
             }
         };
-        Some(RenderSettings { paths: render.paths, stop, seed: render.seed })
+        Some(RenderSettings { paths: render.paths, stop, radius: render.radius, seed: render.seed })
     }
 }
 
