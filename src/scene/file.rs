@@ -2,7 +2,6 @@
 //!
 //! Each type here is the one declaration of its JSON: field names, types, limits, defaults.
 
-use crate::radius::RadiusRule;
 use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
 use super::read::{
@@ -11,6 +10,7 @@ use super::read::{
     uv,
 };
 use super::{Paths, Tone};
+use crate::radius::RadiusRule;
 use std::collections::BTreeSet;
 
 /// The version of the format that is read.
