@@ -249,6 +249,27 @@ fn a_wrong_byte_anywhere_causes_no_panic() {
 }
 
 #[test]
+fn extreme_numbers_anywhere_cause_no_panic() {
+    let is_number = |c: char| c.is_ascii_digit() || ['.', '-'].contains(&c);
+    let starts: Vec<usize> = BASE
+        .char_indices()
+        .filter(|(at, c)| is_number(*c) && !BASE[..*at].ends_with(is_number))
+        .map(|(at, _)| at)
+        .collect();
+    assert!(starts.len() > 100, "the numbers of the base scene are found");
+    for at in starts {
+        let rest = BASE[at..].trim_start_matches(is_number);
+        for number in ["0", "-0.0", "1e-9", "1e9", "-1e9", "1e-300", "1e38", "1e308", "4294967295"] {
+            let text = format!("{}{number}{rest}", &BASE[..at]);
+            match Scene::from_json(&text, &NoAssets) {
+                Ok(scene) => assert!(scene.camera.forward.is_finite(), "{text}"),
+                Err(errors) => assert!(!errors.issues.is_empty(), "{text}"),
+            }
+        }
+    }
+}
+
+#[test]
 fn whatever_is_not_a_scene_is_refused() {
     for text in ["", " ", "null", "1", "\"\"", "[]", "{}", "\u{feff}", "[[[[", "{\"a\":{\"a\":", "\0"] {
         errors(text);
