@@ -1,5 +1,6 @@
 //! Nephroid: caustics by two-pass photon mapping.
 
+pub mod compare;
 pub mod develop;
 pub mod film;
 pub mod geometry;

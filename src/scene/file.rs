@@ -14,7 +14,7 @@ use crate::radius::RadiusRule;
 use std::collections::BTreeSet;
 
 /// The version of the format that is read.
-const VERSION: &str = "1";
+const VERSION: f64 = 1.0;
 /// Most pixels across or down.
 const MAX_IMAGE_SIDE: u32 = 16_384;
 
@@ -303,7 +303,7 @@ impl Decode for Version {
 
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<()> {
         match &node.value {
-            Value::Number(written) if *written == VERSION => Some(()),
+            Value::Number(written) if written.parse() == Ok(VERSION) => Some(()),
             Value::Number(written) => {
                 let message =
                     format!("this program reads version {VERSION} of the format, not {written:.20}");

@@ -249,6 +249,27 @@ fn a_wrong_byte_anywhere_causes_no_panic() {
 }
 
 #[test]
+fn extreme_numbers_anywhere_cause_no_panic() {
+    let is_number = |c: char| c.is_ascii_digit() || ['.', '-'].contains(&c);
+    let starts: Vec<usize> = BASE
+        .char_indices()
+        .filter(|(at, c)| is_number(*c) && !BASE[..*at].ends_with(is_number))
+        .map(|(at, _)| at)
+        .collect();
+    assert!(starts.len() > 100, "the numbers of the base scene are found");
+    for at in starts {
+        let rest = BASE[at..].trim_start_matches(is_number);
+        for number in ["0", "-0.0", "1e-9", "1e9", "-1e9", "1e-300", "1e38", "1e308", "4294967295"] {
+            let text = format!("{}{number}{rest}", &BASE[..at]);
+            match Scene::from_json(&text, &NoAssets) {
+                Ok(scene) => assert!(scene.camera.forward.is_finite(), "{text}"),
+                Err(errors) => assert!(!errors.issues.is_empty(), "{text}"),
+            }
+        }
+    }
+}
+
+#[test]
 fn whatever_is_not_a_scene_is_refused() {
     for text in ["", " ", "null", "1", "\"\"", "[]", "{}", "\u{feff}", "[[[[", "{\"a\":{\"a\":", "\0"] {
         errors(text);
@@ -319,10 +340,10 @@ fn bad_assets_are_errors_at_the_field_that_names_them() {
 
 fn sample_scenes() -> Vec<(String, String)> {
     let mut scenes: Vec<(String, String)> = std::fs::read_dir("scenes")
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
+        .expect("the samples are in scenes/")
+        .map(|entry| entry.expect("a readable folder").path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "json"))
-        .map(|path| (path.display().to_string(), std::fs::read_to_string(&path).unwrap()))
+        .map(|path| (path.display().to_string(), std::fs::read_to_string(&path).expect("a text")))
         .collect();
     scenes.sort();
     scenes
