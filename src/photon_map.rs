@@ -113,7 +113,7 @@ impl PhotonMap {
         let Some(tree) = &self.tree else { return found };
         let radius2 = lookup.radius * lookup.radius;
         // A radius of no size (or NaN) holds no photons and has no density.
-        if !(radius2 > 0.0 && radius2.is_finite()) {
+        if !(lookup.radius > 0.0 && radius2 > 0.0 && radius2.is_finite()) {
             return found;
         }
         let center = ROTATION * lookup.point;

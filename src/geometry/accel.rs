@@ -2,7 +2,7 @@
 
 use super::{Bounds, Ray};
 use obvhs::aabb::Aabb;
-use obvhs::cwbvh::{CwBvh, builder::build_cwbvh};
+use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::ray::{Ray as BvhRay, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 use std::time::Duration;
@@ -15,8 +15,8 @@ const LIST_LIMIT: usize = 8;
 pub(super) enum Accel {
     /// Every primitive is tested; holds how many there are.
     List(usize),
-    /// A compressed eight-wide hierarchy of boxes (Ylitie et al. 2017), built by `obvhs`.
-    Bvh(Box<CwBvh>),
+    /// A binary hierarchy of boxes, built and walked by `obvhs`; of any depth, as many equal primitives make.
+    Bvh(Box<Bvh2>),
 }
 
 impl std::fmt::Debug for Accel {
@@ -38,7 +38,7 @@ impl Accel {
             return (Self::List(bounds.len()), (0..bounds.len() as u32).collect());
         }
         let mut build_time = Duration::ZERO;
-        let mut bvh = build_cwbvh(bounds, BvhBuildParams::medium_build(), &mut build_time);
+        let mut bvh = build_bvh2(bounds, BvhBuildParams::medium_build(), &mut build_time);
         let order = std::mem::take(&mut bvh.primitive_indices);
         (Self::Bvh(Box::new(bvh)), order)
     }

@@ -66,7 +66,7 @@ fn sphere_uv(normal: Vec3) -> Vec2 {
 ///
 /// Neither the discriminant nor the smaller root is a difference of large numbers: with `f = origin -
 /// center` and `l` the part of `f` perpendicular to the ray, the discriminant is `r² - l·l`, and the root
-/// that would cancel is `c / q` with `c = (|f| - r)(|f| + r)` (Haines et al., *Ray Tracing Gems*, ch. 7).
+/// that would cancel is `c / q` with `c = |f|² - r²` summed without rounding (Haines et al., *Ray Tracing Gems*, ch. 7).
 /// `direction` need not be exactly of unit length.
 #[must_use]
 pub fn roots(origin: DVec3, direction: DVec3, center: DVec3, radius: f64) -> Option<(f64, f64)> {
@@ -78,8 +78,7 @@ pub fn roots(origin: DVec3, direction: DVec3, center: DVec3, radius: f64) -> Opt
     if discriminant < 0.0 || discriminant.is_nan() {
         return None;
     }
-    let distance = f.length();
-    let c = (distance - radius) * (distance + radius);
+    let c = squared_length_minus(f, radius);
     let half_chord = (a * discriminant).sqrt();
     // The sum of two numbers of one sign.
     let q = if b > 0.0 { -b - half_chord } else { -b + half_chord };
@@ -88,4 +87,36 @@ pub fn roots(origin: DVec3, direction: DVec3, center: DVec3, radius: f64) -> Opt
     }
     let (t0, t1) = (c / q, q / a);
     Some(if t0 < t1 { (t0, t1) } else { (t1, t0) })
+}
+
+/// |f|² - r², right to the last digits also where the two almost cancel: near a sphere of radius 1e8 their
+/// rounding alone would move the hit by 4e-9 of the distance.
+fn squared_length_minus(f: DVec3, radius: f64) -> f64 {
+    let rounded = f.length_squared() - radius * radius;
+    if rounded.abs() > 1e-4 * radius * radius {
+        return rounded;
+    }
+    let squares = [two_square(f.x), two_square(f.y), two_square(f.z), two_square(radius)];
+    let [x, y, z, r] = squares;
+    let (xy, e0) = two_sum(x.0, y.0);
+    let (xyz, e1) = two_sum(xy, z.0);
+    let (all, e2) = two_sum(xyz, -r.0);
+    all + (e0 + e1 + e2 + x.1 + y.1 + z.1 - r.1)
+}
+
+/// a² as a rounded value and its error (Dekker 1971).
+fn two_square(a: f64) -> (f64, f64) {
+    const SPLITTER: f64 = 134_217_729.0; // 2^27 + 1
+    let square = a * a;
+    let c = SPLITTER * a;
+    let high = c - (c - a);
+    let low = a - high;
+    (square, ((high * high - square) + 2.0 * high * low) + low * low)
+}
+
+/// a + b as a rounded value and its error (Knuth).
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let bb = sum - a;
+    (sum, (a - (sum - bb)) + (b - bb))
 }

@@ -18,12 +18,13 @@ fn t1_f1_a_distant_small_sphere_is_hit_to_1e_8() {
     );
 }
 
-/// T2, F2: standing on a sphere of radius 1e8.
+/// T2, F2: standing on a sphere of radius 1e8. The ray would meet a plane at 1.25; the sphere curves away by
+/// 0.75² / 2e8 below it, which the slanting ray takes 3.5e-9 more to reach.
 #[test]
 fn t2_f2_a_huge_sphere_underfoot_is_hit_to_1e_12() {
     let (near, _) =
         sphere_roots(DVec3::Y, DVec3::new(0.6, -0.8, 0.0), DVec3::new(0.0, -1e8, 0.0), 1e8).unwrap();
-    assert!((near - 1.25).abs() < 1e-12, "{near}");
+    assert!((near - (1.25 + 3.515_625e-9)).abs() < 1e-12, "{near}");
 }
 
 /// T3: from a point of the sphere the root near zero is not a hit, at any scale and in any direction.
@@ -49,7 +50,9 @@ fn t3_a_ray_that_leaves_a_sphere_does_not_meet_it_again() {
             let origin = offset_origin(surface.point, surface.error, surface.normal, -away);
             let other = geometry.closest_hit(&Ray::new(origin, -away)).unwrap();
             let chord = 2.0 * scale * away.dot(surface.normal);
-            assert!((other.t - chord).abs() < 1e-5 * scale, "{scale} {i}: {} {chord}", other.t);
+            // The offset of a few ulps of the coordinates counts the more the more the ray grazes.
+            let tolerance = 2e-6 * scale / away.dot(surface.normal);
+            assert!((other.t - chord).abs() < tolerance, "{scale} {i}: {} {chord}", other.t);
         }
     }
 }

@@ -1,0 +1,59 @@
+//! Scenes and pictures on disk.
+
+use super::Failure;
+use nephroid::image_io::{self, ImageFormat, LinearImage};
+use nephroid::scene::{DirectoryAssets, ImageSettings, Scene};
+use std::path::Path;
+
+/// Reads and compiles a scene; meshes are found relative to it.
+pub(super) fn load_scene(path: &Path) -> Result<Scene, Failure> {
+    let bytes = std::fs::read(path).map_err(|e| cannot("read", path, &e))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|e| Failure::Usage(format!("{}: not UTF-8 text: {e}", path.display())))?;
+    let assets = DirectoryAssets::new(path.parent().unwrap_or(Path::new("")));
+    Scene::from_json(&text, &assets).map_err(|errors| Failure::Scene { path: path.to_owned(), errors })
+}
+
+/// The picture format that a file name asks for.
+pub(super) fn format_of(path: &Path) -> Result<ImageFormat, Failure> {
+    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    match extension.as_deref() {
+        Some("png") => Ok(ImageFormat::Png),
+        Some("exr") => Ok(ImageFormat::Exr),
+        Some("npy") => Ok(ImageFormat::Npy),
+        _ => Err(Failure::Usage(format!("{}: the name must end in .png, .exr or .npy", path.display()))),
+    }
+}
+
+/// Writes a picture in the format its name asks for.
+pub(super) fn save_image(path: &Path, image: &LinearImage, settings: &ImageSettings) -> Result<(), Failure> {
+    let encoded = match format_of(path)? {
+        ImageFormat::Png => image_io::encode_png(image, settings),
+        ImageFormat::Exr => image_io::encode_exr(image),
+        ImageFormat::Npy => Ok(image_io::encode_npy(image)),
+    };
+    let bytes = encoded.map_err(|e| Failure::Usage(format!("{}: {e}", path.display())))?;
+    save(path, &bytes)
+}
+
+/// Reads a picture.
+pub(super) fn load_image(path: &Path) -> Result<LinearImage, Failure> {
+    let bytes = std::fs::read(path).map_err(|e| cannot("read", path, &e))?;
+    image_io::decode(&bytes, format_of(path)?).map_err(|e| Failure::Usage(format!("{}: {e}", path.display())))
+}
+
+/// Writes a file.
+pub(super) fn save(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, bytes).map_err(|e| cannot("write", path, &e))
+}
+
+/// An I/O failure in words.
+pub(super) fn cannot(what: &str, path: &Path, error: &std::io::Error) -> Failure {
+    Failure::Usage(format!("cannot {what} {}: {error}", path.display()))
+}
+
+/// One line of output.
+#[expect(clippy::print_stdout, reason = "a command's result goes to standard output")]
+pub(super) fn say(line: impl std::fmt::Display) {
+    println!("{line}");
+}
