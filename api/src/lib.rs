@@ -40,7 +40,8 @@ pub struct AppState {
 }
 
 impl AppState {
-    /// Opens the data folder and starts to render what waits there.
+    /// Opens the data folder and starts to render what waits there. Waits for the disk: not to be called
+    /// on a thread that serves.
     ///
     /// # Errors
     /// If the data folder, the database or the render threads cannot be used.

@@ -5,8 +5,8 @@ use nephroid_api::AppState;
 use nephroid_api::config::{Cli, Settings};
 use std::error::Error;
 use std::io::Write;
+use std::net::TcpListener;
 use std::process::ExitCode;
-use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 
@@ -27,23 +27,28 @@ fn main() -> ExitCode {
     }
 }
 
-#[tokio::main]
-async fn run(settings: Settings) -> Result<(), Box<dyn Error>> {
-    // Before anything else, so that a signal during start is not lost.
-    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+fn run(settings: Settings) -> Result<(), Box<dyn Error>> {
     let listener = TcpListener::bind(settings.listen)
-        .await
         .map_err(|error| format!("cannot listen on {}: {error}", settings.listen))?;
+    listener.set_nonblocking(true)?;
+    let runtime = tokio::runtime::Runtime::new()?;
+    // Before rendering starts, so that a signal from then on puts the jobs aside.
+    let shutdown = runtime.block_on(async { stop_signal() })?;
     let state = AppState::open(settings)?;
     let mut stdout = std::io::stdout();
     writeln!(stdout, "listening on http://{}", listener.local_addr()?)?;
     stdout.flush()?;
-    let shutdown = async move {
+    runtime.block_on(async { nephroid_api::serve(listener.try_into()?, state, shutdown).await })?;
+    Ok(())
+}
+
+/// Completes when the process is asked to end.
+fn stop_signal() -> std::io::Result<impl Future<Output = ()>> {
+    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    Ok(async move {
         tokio::select! {
             _ = terminate.recv() => {}
             _ = interrupt.recv() => {}
         }
-    };
-    nephroid_api::serve(listener, state, shutdown).await?;
-    Ok(())
+    })
 }

@@ -87,7 +87,8 @@ pub fn job_path(id: impl std::fmt::Display) -> String {
 
 fn links_of(job: &Job) -> BTreeMap<String, String> {
     let base = job_path(job.id);
-    let mut links = BTreeMap::from([("self".to_owned(), base.clone())]);
+    let scene = format!("{base}/scene.json");
+    let mut links = BTreeMap::from([("self".to_owned(), base.clone()), ("scene".to_owned(), scene)]);
     if !job.state.is_done() {
         links.insert("cancel".into(), format!("{base}/cancel"));
         links.insert("preview".into(), format!("{base}/preview.png"));

@@ -53,6 +53,11 @@ export class Nephroid {
     return (await this.#send(`/v1/scenes/${encodeURIComponent(name)}`, { signal })).text();
   }
 
+  /** The text of the scene that a job renders. */
+  async scene(id, { signal } = {}) {
+    return (await this.#send(`/v1/renders/${id}/scene.json`, { signal })).text();
+  }
+
   /** The picture of the finished rounds as a Blob, or null while there is none. */
   async preview(id, { signal } = {}) {
     const answer = await fetch(`${this.base}/v1/renders/${id}/preview.png`, { signal });

@@ -19,6 +19,7 @@ async function start() {
   $("scene-form").addEventListener("submit", (event) => (event.preventDefault(), submitScene()));
   $("plan").addEventListener("click", showPlan);
   $("cancel").addEventListener("click", () => following && nephroid.cancel(following.id).then(showJob, showProblem));
+  $("reuse").addEventListener("click", reuseScene);
   $("more").addEventListener("click", () => ((listLength += 16), refreshJobs()));
   $("scene").addEventListener("input", sceneEdited);
   $("scene").addEventListener("scroll", () => ($("gutter").scrollTop = $("scene").scrollTop));
@@ -111,6 +112,17 @@ async function submitScene() {
     showProblem(error);
   } finally {
     $("submit").disabled = false;
+  }
+}
+
+/** Puts the scene of the job in the frame into the editor. */
+async function reuseScene() {
+  try {
+    setScene(await nephroid.scene(following.id));
+    for (const sample of $("samples").querySelectorAll("input")) sample.checked = false;
+    $("scene").focus();
+  } catch (error) {
+    showProblem(error);
   }
 }
 
@@ -215,7 +227,7 @@ function showSketch() {
   following?.stop.abort();
   following = null;
   show(null);
-  for (const id of ["layers", "progress", "cancel", "download", "download-exr", "chart", "plan-box"]) $(id).hidden = true;
+  for (const id of ["layers", "progress", "cancel", "reuse", "download", "download-exr", "chart", "plan-box"]) $(id).hidden = true;
   for (const id of ["rounds", "error", "time"]) $(id).textContent = "–";
   setState("sketch", "sketch");
   $("said").textContent = "Outline through the scene's camera. The picture comes with “Render”.";
@@ -230,6 +242,7 @@ function showJob(job) {
   if (job.state === "queued") $("progress").removeAttribute("value");
   else $("progress").value = job.progress;
   $("cancel").hidden = job.done;
+  $("reuse").hidden = false;
   $("rounds").textContent = job.rounds || "–";
   $("error").textContent = job.error_estimate ? percent(job.error_estimate) : "–";
   $("time").textContent = job.started_at ? elapsed(job) : "–";
@@ -360,7 +373,8 @@ function jobItem(job, known) {
                make("span", "quiet", `${when(job.created_at)} · ${job.width} × ${job.height}`));
   const state = make("span", "state", WORDS[job.state] + progress);
   state.dataset.state = job.state;
-  link.append(picture, words, state);
+  words.append(state);
+  link.append(picture, words);
   item.append(link, removeButton(job));
   return item;
 }

@@ -232,6 +232,15 @@ impl Jobs {
             .ok_or(job.state))
     }
 
+    /// The scene of a job, as it came.
+    pub async fn scene(&self, id: JobId) -> Result<String, StoreError> {
+        self.status(id).await?;
+        let files = self.files.clone();
+        let read = tokio::task::spawn_blocking(move || files.scene(id)).await;
+        // A job without its scene has just been deleted.
+        read.ok().and_then(Result::ok).ok_or(StoreError::NotFound)
+    }
+
     /// The picture so far.
     pub async fn preview(&self, id: JobId) -> Result<PreviewState, StoreError> {
         if let Some(preview) = self.registry.get(id).and_then(|live| live.preview()) {

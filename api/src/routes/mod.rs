@@ -25,6 +25,7 @@ pub fn router(state: AppState) -> Router {
         .route("/v1/renders", post(renders::create_render).get(renders::list_renders))
         .route("/v1/renders/{id}", get(renders::get_render).delete(renders::delete_render))
         .route("/v1/renders/{id}/cancel", post(renders::cancel_render))
+        .route("/v1/renders/{id}/scene.json", get(renders::get_render_scene))
         .route("/v1/renders/{id}/image.png", get(pictures::get_image_png))
         .route("/v1/renders/{id}/image.exr", get(pictures::get_image_exr))
         .route("/v1/renders/{id}/preview.png", get(pictures::get_preview))

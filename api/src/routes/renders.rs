@@ -95,6 +95,15 @@ pub(super) async fn get_render(
     Ok(not_modified(&headers, response))
 }
 
+/// `GET /v1/renders/{id}/scene.json`
+pub(super) async fn get_render_scene(
+    State(app): State<AppState>,
+    Path(id): Path<String>,
+) -> Result<Response, Problem> {
+    let scene = app.jobs.scene(parse_id(&id)?).await?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], scene).into_response())
+}
+
 /// `POST /v1/renders/{id}/cancel`
 pub(super) async fn cancel_render(
     State(app): State<AppState>,
