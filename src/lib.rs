@@ -1,5 +1,15 @@
 //! Nephroid: caustics by two-pass photon mapping.
 
+pub mod develop;
+pub mod film;
 pub mod geometry;
+pub mod image_io;
 pub mod light_path;
+pub mod optics;
+pub mod pass1_light;
+pub mod pass2_eye;
+pub mod photon_map;
+pub mod plan;
+pub mod render;
+pub mod sampling;
 pub mod scene;

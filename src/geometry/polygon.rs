@@ -1,0 +1,271 @@
+//! Ray against planar polygon: the even-odd rule with half-open edges, so that polygons that share an edge
+//! neither overlap nor leave a gap.
+
+use super::bounds::Bounds;
+use super::{Ray, SurfacePoint};
+use glam::{DVec2, DVec3, Vec2, Vec3};
+
+/// A planar polygon, concave or with holes. Its corners, projected along the normal's largest component,
+/// are a range of the scene's array of [`Edge`]s.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Polygon {
+    /// Unit normal by the right-hand rule over the outline.
+    normal: DVec3,
+    /// The plane is `normal · p = offset`.
+    offset: f64,
+    /// Which two coordinates span the projection.
+    axes: [usize; 2],
+    /// First corner of the outline: origin of the texture coordinates.
+    origin: DVec3,
+    /// Unit vector along the first edge: direction of u.
+    along: DVec3,
+    /// Range of the polygon's edges.
+    edges: std::ops::Range<u32>,
+    bounds: Bounds,
+    /// Corners of the outline.
+    corners: Vec<Vec3>,
+}
+
+/// One edge of a polygon, projected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Edge {
+    from: DVec2,
+    to: DVec2,
+}
+
+/// What is wrong with a polygon. `outline` is 0 for the outer one, then counts the holes.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PolygonError {
+    /// No area, so no normal: fewer than three corners, all on a line, or crossing so that parts cancel.
+    #[error("no area: at least three vertices that are not on a line are needed")]
+    NoArea {
+        /// Which outline.
+        outline: usize,
+    },
+    /// The corners do not lie in a plane.
+    #[error(
+        "not planar: a vertex is {distance:.1e} m off the polygon's plane, {tolerance:.1e} m are allowed"
+    )]
+    NotPlanar {
+        /// Which outline.
+        outline: usize,
+        /// Distance of the worst corner from the plane.
+        distance: f64,
+        /// What is allowed.
+        tolerance: f64,
+    },
+}
+
+impl PolygonError {
+    /// Which outline is wrong: 0 for the outer one, then the holes.
+    #[must_use]
+    pub fn outline(&self) -> usize {
+        match *self {
+            Self::NoArea { outline } | Self::NotPlanar { outline, .. } => outline,
+        }
+    }
+}
+
+/// How far a corner may lie off the plane, as a fraction of the polygon's size: corners given with five
+/// digits.
+const PLANARITY: f64 = 1e-4;
+
+/// Least area of an outline as a fraction of its squared size: below it f32 does not tell its sides apart.
+const LEAST_AREA: f64 = 1e-7;
+
+impl Polygon {
+    /// Makes a polygon of an outline and the outlines of its holes, and appends its edges to `edges`.
+    ///
+    /// # Errors
+    /// See [`PolygonError`].
+    pub(super) fn new(outlines: &[Vec<Vec3>], edges: &mut Vec<Edge>) -> Result<Self, PolygonError> {
+        let plane = Plane::of(outlines)?;
+        let first = edges.len() as u32;
+        for outline in outlines {
+            for (i, a) in outline.iter().enumerate() {
+                let b = outline[(i + 1) % outline.len()];
+                edges.push(Edge { from: plane.project(*a), to: plane.project(b) });
+            }
+        }
+        let outline = &outlines[0];
+        let origin = outline[0].as_dvec3();
+        let along = outline.iter().map(|p| p.as_dvec3() - origin).find_map(DVec3::try_normalize);
+        Ok(Self {
+            normal: plane.normal,
+            offset: plane.offset,
+            axes: plane.axes,
+            origin,
+            along: along.unwrap_or(DVec3::X),
+            edges: first..edges.len() as u32,
+            corners: outline.clone(),
+            bounds: Bounds::of(outlines.iter().flatten().copied()).padded(),
+        })
+    }
+
+    /// Distance along the ray in `(0, t_max)`; a ray in the polygon's own plane misses.
+    #[inline]
+    pub(super) fn intersect(&self, ray: &Ray, t_max: f32, edges: &[Edge]) -> Option<f32> {
+        let direction = ray.direction.as_dvec3();
+        let t = self.plane_distance(ray, direction)?;
+        if !(t > 0.0 && t < f64::from(t_max)) {
+            return None;
+        }
+        let p = ray.origin.as_dvec3() + direction * t;
+        self.contains(DVec2::new(p[self.axes[0]], p[self.axes[1]]), edges).then_some(t as f32)
+    }
+
+    #[inline]
+    fn plane_distance(&self, ray: &Ray, direction: DVec3) -> Option<f64> {
+        let slope = self.normal.dot(direction);
+        let t = (self.offset - self.normal.dot(ray.origin.as_dvec3())) / slope;
+        // Parallel rays give an infinite or undefined distance.
+        t.is_finite().then_some(t)
+    }
+
+    /// Even-odd rule; an edge counts if exactly one of its ends lies strictly above the point.
+    #[inline]
+    fn contains(&self, p: DVec2, edges: &[Edge]) -> bool {
+        let mut inside = false;
+        for edge in &edges[self.edges.start as usize..self.edges.end as usize] {
+            let (a, b) = (edge.from, edge.to);
+            if (a.y > p.y) != (b.y > p.y) {
+                // Both ends are taken in the same order for both polygons that share the edge, so that they
+                // agree on which side the point lies.
+                let (low, high) = if a.y < b.y { (a, b) } else { (b, a) };
+                let x = low.x + (p.y - low.y) / (high.y - low.y) * (high.x - low.x);
+                inside ^= p.x < x;
+            }
+        }
+        inside
+    }
+
+    pub(super) fn surface(&self, ray: &Ray, t: f32) -> SurfacePoint {
+        let direction = ray.direction.as_dvec3();
+        let t = self.plane_distance(ray, direction).unwrap_or(f64::from(t));
+        let p = ray.origin.as_dvec3() + direction * t;
+        let p = p - self.normal * (self.normal.dot(p) - self.offset);
+        let local = p - self.origin;
+        let across = self.normal.cross(self.along);
+        let point = p.as_vec3();
+        let normal = self.normal.as_vec3();
+        SurfacePoint {
+            point,
+            // Half an ulp per coordinate from rounding to f32; doubled for the plane's own rounding.
+            error: point.abs().max_element() * f32::EPSILON,
+            normal,
+            shading_normal: normal,
+            uv: Vec2::new(local.dot(self.along) as f32, local.dot(across) as f32),
+        }
+    }
+
+    pub(super) fn corners(&self) -> &[Vec3] {
+        &self.corners
+    }
+
+    pub(super) fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// Share of a disc kernel around a point of the polygon that lies on the polygon, for the Epanechnikov
+    /// kernel of radius `radius`: the kernel is divided by it, so that light is not lost at borders.
+    ///
+    /// Exact for one straight edge within reach; for two edges the shares are multiplied, which is exact at
+    /// a right-angled corner's apex to 10 %.
+    pub(super) fn kernel_mass(&self, point: Vec3, radius: f32, edges: &[Edge]) -> f32 {
+        let p = point.as_dvec3();
+        let dropped = 3 - self.axes[0] - self.axes[1];
+        let projected = DVec2::new(p[self.axes[0]], p[self.axes[1]]);
+        // An edge's distance in the projection is at most its distance in space.
+        let reach = f64::from(radius);
+        let mut mass = 1.0;
+        for edge in &edges[self.edges.start as usize..self.edges.end as usize] {
+            let low = edge.from.min(edge.to) - reach;
+            let high = edge.from.max(edge.to) + reach;
+            if projected.cmplt(low).any() || projected.cmpgt(high).any() {
+                continue;
+            }
+            let from = self.lift(edge.from, dropped);
+            let to = self.lift(edge.to, dropped);
+            let s = ((p - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
+            let distance = (p - from.lerp(to, s)).length();
+            if distance < reach {
+                mass *= epanechnikov_half_plane(distance / reach);
+            }
+        }
+        // A sliver narrower than the kernel cannot be trusted to less than a quarter of it.
+        mass.max(0.25) as f32
+    }
+
+    fn lift(&self, p: DVec2, dropped: usize) -> DVec3 {
+        let mut q = DVec3::ZERO;
+        q[self.axes[0]] = p.x;
+        q[self.axes[1]] = p.y;
+        q[dropped] = (self.offset - self.normal.dot(q)) / self.normal[dropped];
+        q
+    }
+}
+
+/// Mass of the 2-D Epanechnikov kernel of radius 1 on the side of a line at distance `s` that holds its
+/// centre: 1/2 + ∫₀ˢ (8/3π)(1-x²)^{3/2} dx.
+fn epanechnikov_half_plane(s: f64) -> f64 {
+    let s = s.clamp(0.0, 1.0);
+    let root = (1.0 - s * s).sqrt();
+    let integral = (s * root * (5.0 - 2.0 * s * s) + 3.0 * libm::asin(s)) / 8.0;
+    0.5 + integral * 8.0 / (3.0 * std::f64::consts::PI)
+}
+
+/// The plane of a polygon and the projection along its largest component.
+struct Plane {
+    normal: DVec3,
+    offset: f64,
+    axes: [usize; 2],
+}
+
+impl Plane {
+    fn of(outlines: &[Vec<Vec3>]) -> Result<Self, PolygonError> {
+        for (outline, corners) in outlines.iter().enumerate() {
+            let size = extent(corners);
+            let area = 0.5 * doubled_area(corners).length();
+            if area.is_nan() || area <= LEAST_AREA * size * size {
+                return Err(PolygonError::NoArea { outline });
+            }
+        }
+        let corners = outlines.first().ok_or(PolygonError::NoArea { outline: 0 })?;
+        let normal = doubled_area(corners).normalize();
+        let count = corners.len() as f64;
+        let offset = corners.iter().map(|p| normal.dot(p.as_dvec3())).sum::<f64>() / count;
+        let tolerance = PLANARITY * extent(corners);
+        for (outline, corners) in outlines.iter().enumerate() {
+            let off = corners.iter().map(|p| (normal.dot(p.as_dvec3()) - offset).abs()).fold(0.0, f64::max);
+            if off > tolerance {
+                return Err(PolygonError::NotPlanar { outline, distance: off, tolerance });
+            }
+        }
+        let size = normal.abs();
+        let axes = if size.x >= size.y && size.x >= size.z {
+            [1, 2]
+        } else if size.y >= size.z {
+            [0, 2]
+        } else {
+            [0, 1]
+        };
+        Ok(Self { normal, offset, axes })
+    }
+
+    fn project(&self, p: Vec3) -> DVec2 {
+        DVec2::new(f64::from(p[self.axes[0]]), f64::from(p[self.axes[1]]))
+    }
+}
+
+/// Newell's normal: its length is twice the area of the outline.
+fn doubled_area(corners: &[Vec3]) -> DVec3 {
+    let Some(base) = corners.first().map(|p| p.as_dvec3()) else { return DVec3::ZERO };
+    let spokes = || corners.iter().skip(1).map(|p| p.as_dvec3() - base);
+    spokes().zip(spokes().skip(1)).map(|(a, b)| a.cross(b)).sum()
+}
+
+/// Largest distance of a corner from the first.
+fn extent(corners: &[Vec3]) -> f64 {
+    let Some(base) = corners.first().map(|p| p.as_dvec3()) else { return 0.0 };
+    corners.iter().map(|p| p.as_dvec3().distance(base)).fold(0.0, f64::max)
+}

@@ -18,4 +18,61 @@ impl Ray {
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self { origin, direction }
     }
+
+    /// The point at distance `t`.
+    #[inline]
+    #[must_use]
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.origin + self.direction * t
+    }
+}
+
+/// Moves a surface point off its surface to the side of `direction`, by no more than the point may be
+/// wrong: `error` bounds how far the rounded point lies from the true surface. A ray that starts at the
+/// result and leaves to that side cannot meet the same flat or convex piece of surface again. There is no
+/// scene-sized epsilon: the bound comes from the arithmetic that made the point (Pharr et al., *Physically
+/// Based Rendering*, 6.8 "Managing rounding error").
+#[inline]
+#[must_use]
+pub fn offset_origin(point: Vec3, error: f32, normal: Vec3, direction: Vec3) -> Vec3 {
+    // The sum of the normal's components turns a bound per coordinate into one along the normal.
+    let distance = error * normal.abs().element_sum();
+    let side = if direction.dot(normal) < 0.0 { -normal } else { normal };
+    let moved = point + side * distance;
+    Vec3::new(away(point.x, moved.x, side.x), away(point.y, moved.y, side.y), away(point.z, moved.z, side.z))
+}
+
+/// Rounds `moved` one step further along `side`, so that rounding the sum cannot undo the move.
+#[inline]
+fn away(point: f32, moved: f32, side: f32) -> f32 {
+    if moved == point && side.abs() < 1e-3 {
+        return moved;
+    }
+    if side > 0.0 {
+        moved.next_up()
+    } else if side < 0.0 {
+        moved.next_down()
+    } else {
+        moved
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_offset_point_lies_strictly_on_the_side_of_the_ray_at_every_scale() {
+        for scale in [1e-6_f32, 1e-3, 1.0, 1e3, 1e6] {
+            let point = Vec3::new(0.3, 1.7, -2.2) * scale;
+            let normal = Vec3::new(0.6, 0.0, 0.8);
+            let error = 2.2 * scale * f32::EPSILON;
+            let up = offset_origin(point, error, normal, normal);
+            let down = offset_origin(point, error, normal, -normal);
+            let height = |p: Vec3| (p.as_dvec3() - point.as_dvec3()).dot(normal.as_dvec3());
+            assert!(height(up) >= f64::from(error), "{scale}: {}", height(up));
+            assert!(height(down) <= -f64::from(error), "{scale}: {}", height(down));
+            assert!(height(up) < 20.0 * f64::from(error), "{scale}: moved too far");
+        }
+    }
 }

@@ -23,7 +23,13 @@ pub struct Camera {
 impl Camera {
     /// A camera at `eye` that looks at `target`; `None` where those and `up` span no basis.
     #[must_use]
-    pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, vertical_fov_deg: f32, resolution: Vec2) -> Option<Self> {
+    pub fn look_at(
+        eye: Vec3,
+        target: Vec3,
+        up: Vec3,
+        vertical_fov_deg: f32,
+        resolution: Vec2,
+    ) -> Option<Self> {
         let forward = (target - eye).try_normalize()?;
         let up = up.try_normalize()?;
         let right = forward.cross(up);

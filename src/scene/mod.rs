@@ -1,18 +1,27 @@
 //! The compiled scene: flat arrays and typed ids, the only thing the two passes see.
 //!
-//! A scene file is first read into a [`file::SceneFile`] (exactly what the JSON says), then
-//! [`compile`]d into a [`Scene`]. Rendering never changes it.
+//! A scene file is first read into a `SceneFile` (`file.rs`: exactly what the JSON says), then
+//! compiled into a [`Scene`] (`compile/`). Rendering never changes it.
 
+pub mod assets;
 mod camera;
+mod compile;
+mod file;
+mod issue;
+mod json;
 mod light;
 mod material;
+mod mesh_file;
+mod read;
 
+pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
 pub use camera::Camera;
+pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{Light, QuadLight};
 pub use material::{Material, Texture};
 
 use crate::geometry::Geometry;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 macro_rules! typed_id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -110,6 +119,25 @@ pub enum Paths {
     Caustics,
 }
 
+impl Paths {
+    /// Every value and its name.
+    pub const NAMED: [(&str, Self); 2] = [("whitted", Self::Whitted), ("caustics", Self::Caustics)];
+}
+
+/// A value of `paths` that does not exist.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not one of `whitted` (LS*E|LDS*E) and `caustics` (LS*E|LDS*E|LS+DS*E)")]
+pub struct UnknownPaths(String);
+
+impl std::str::FromStr for Paths {
+    type Err = UnknownPaths;
+
+    fn from_str(text: &str) -> Result<Self, UnknownPaths> {
+        let known = Self::NAMED.iter().find(|(name, _)| *name == text);
+        known.map(|(_, paths)| *paths).ok_or_else(|| UnknownPaths(text.to_owned()))
+    }
+}
+
 /// What the scene file asks of the renderer.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct RenderSettings {
@@ -124,7 +152,7 @@ pub struct RenderSettings {
 /// When a render ends: the first limit that is reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// Estimated relative error of the picture (see [`crate::error_estimate`]).
+    /// Estimated relative error of the picture (see [`crate::film::Film::error_estimate`]).
     pub error: Option<f32>,
     /// Seconds of wall-clock time spent rendering.
     pub seconds: Option<f64>,
@@ -139,6 +167,13 @@ impl Default for Stop {
 }
 
 impl Scene {
+    /// Renders at another size, with the same vertical field of view.
+    pub fn set_size(&mut self, width: u32, height: u32) {
+        self.image.width = width;
+        self.image.height = height;
+        self.camera.resolution = Vec2::new(width as f32, height as f32);
+    }
+
     /// The material of an object.
     #[inline]
     #[must_use]

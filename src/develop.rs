@@ -1,0 +1,80 @@
+//! From linear radiance to the numbers of a display: exposure, tone curve, sRGB.
+
+use crate::image_io::LinearImage;
+use crate::scene::{ImageSettings, Tone};
+
+/// The picture as 8-bit sRGB, three bytes per pixel, top row first. Pixels must be finite; NaN becomes 0.
+#[must_use]
+pub fn develop(image: &LinearImage, settings: &ImageSettings) -> Vec<u8> {
+    let gain = libm::exp2(f64::from(settings.exposure));
+    let encode = |x: &f32| {
+        let shown = match settings.tone {
+            Tone::Linear => f64::from(*x) * gain,
+            Tone::Filmic => filmic(f64::from(*x) * gain),
+        };
+        to_byte(linear_to_srgb(shown.clamp(0.0, 1.0)))
+    };
+    image.pixels.iter().flatten().map(encode).collect()
+}
+
+/// The ACES-like fit of Narkowicz (2015), which maps 0..∞ to 0..1.
+fn filmic(x: f64) -> f64 {
+    // Above this the curve is flat, and the squares below may overflow.
+    let x = x.clamp(0.0, 1e6);
+    (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)
+}
+
+/// The sRGB curve (IEC 61966-2-1), 0..1 to 0..1.
+fn linear_to_srgb(x: f64) -> f64 {
+    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::pow(x, 1.0 / 2.4) - 0.055 }
+}
+
+fn to_byte(x: f64) -> u8 {
+    (x * 255.0).round() as u8
+}
+
+/// The linear value of an sRGB byte.
+#[must_use]
+pub fn srgb_to_linear(byte: u8) -> f64 {
+    let x = f64::from(byte) / 255.0;
+    if x <= 0.040_45 { x / 12.92 } else { libm::pow((x + 0.055) / 1.055, 2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(value: f32, exposure: f32, tone: Tone) -> u8 {
+        let image = LinearImage { width: 1, height: 1, pixels: vec![[value; 3]] };
+        develop(&image, &ImageSettings { width: 1, height: 1, exposure, tone })[0]
+    }
+
+    #[test]
+    fn the_srgb_curve_is_the_standard_one() {
+        for (linear, byte) in [(0.18, 118), (0.5, 188), (1.0, 255), (0.0, 0), (-1.0, 0), (9.0, 255)] {
+            assert_eq!(shown(linear, 0.0, Tone::Linear), byte, "{linear}");
+        }
+    }
+
+    #[test]
+    fn one_stop_doubles_the_light() {
+        assert_eq!(shown(0.25, 1.0, Tone::Linear), 188);
+        assert_eq!(shown(1.0, -1.0, Tone::Linear), 188);
+    }
+
+    #[test]
+    fn every_byte_survives_the_way_to_linear_and_back() {
+        for byte in 0..=255 {
+            assert_eq!(shown(srgb_to_linear(byte) as f32, 0.0, Tone::Linear), byte);
+        }
+    }
+
+    #[test]
+    fn the_filmic_curve_rises_and_never_passes_white() {
+        let bytes: Vec<u8> =
+            [0.0, 0.1, 0.5, 1.0, 4.0, f32::MAX].map(|x| shown(x, 0.0, Tone::Filmic)).to_vec();
+        assert!(bytes.is_sorted(), "{bytes:?}");
+        // Narkowicz's curve gives 2.54 / 3.16 = 0.8038 at 1, which sRGB shows as 231.6.
+        assert_eq!((bytes[0], bytes[3], bytes[5]), (0, 232, 255));
+    }
+}

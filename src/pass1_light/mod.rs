@@ -1,0 +1,145 @@
+//! Pass 1, `LS+D`: photons from every light toward what is specular, through any chain of mirrors and glass,
+//! to the first D.
+
+mod emit;
+mod energy;
+mod walk;
+mod window;
+
+pub use emit::Emission;
+pub use energy::{Energy, Tally};
+pub use window::{Region, Source, Window, windows};
+
+use crate::photon_map::{Photon, PhotonMap};
+use crate::render::{Control, RenderError};
+use crate::sampling::{SamplePoint, hash};
+use crate::scene::Scene;
+use rayon::prelude::*;
+use walk::{Fate, walk};
+
+/// Photons traced between two looks at the cancel flag; also the unit of parallel work.
+const BATCH: u32 = 4096;
+
+/// A window and how many photons each round sends through it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Budget {
+    /// Where the photons go.
+    pub window: Window,
+    /// Each half of a round takes a block of 2^`log2_block` points of the window's sequence.
+    pub log2_block: u32,
+}
+
+/// The photons of one round in two independent halves, and what became of all light that was sent.
+pub struct RoundPhotons {
+    /// One map per half.
+    pub maps: [PhotonMap; 2],
+    /// Energy per window, summed over both halves (each half carries the window's whole flux).
+    pub tallies: Vec<Tally>,
+}
+
+/// Traces round `round`'s block of each window's two scrambled sequences.
+///
+/// # Errors
+/// [`RenderError::Cancelled`] if the control says so.
+pub fn emit_photons(
+    scene: &Scene,
+    budgets: &[Budget],
+    round: u32,
+    control: &Control,
+) -> Result<RoundPhotons, RenderError> {
+    let (halves, tallies): (Vec<_>, Vec<_>) = (0..2)
+        .map(|half| emit_half(scene, budgets, round, half, control))
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter()
+        .unzip();
+    let (a, b) = rayon::join(|| PhotonMap::build(&halves[0]), || PhotonMap::build(&halves[1]));
+    let mut sum = vec![Tally::default(); budgets.len()];
+    for half in &tallies {
+        for (total, tally) in sum.iter_mut().zip(half) {
+            total.add(tally);
+        }
+    }
+    Ok(RoundPhotons { maps: [a, b], tallies: sum })
+}
+
+fn emit_half(
+    scene: &Scene,
+    budgets: &[Budget],
+    round: u32,
+    half: u32,
+    control: &Control,
+) -> Result<(Vec<Photon>, Vec<Tally>), RenderError> {
+    let mut photons = Vec::new();
+    let mut tallies = Vec::with_capacity(budgets.len());
+    for (index, budget) in budgets.iter().enumerate() {
+        let count = 1_u32 << budget.log2_block;
+        let seed = window_seed(scene.render.seed, index, half);
+        let block = Block { first: round.wrapping_mul(count), count, seed };
+        let (mut found, tally) = trace_block(scene, &budget.window, block, control)?;
+        photons.append(&mut found);
+        tallies.push(tally);
+    }
+    Ok((photons, tallies))
+}
+
+/// Seed of a window's sequence for one half.
+fn window_seed(seed: u64, window: usize, half: u32) -> u64 {
+    const PASS_1: u64 = 1;
+    hash(hash(hash(seed, PASS_1), window as u64), u64::from(half))
+}
+
+/// A run of consecutive points of one scrambled sequence.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Block {
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+    pub(crate) seed: u64,
+}
+
+/// Traces a block of photons through one window; the result is in the order of the points, whatever the
+/// number of threads.
+pub(crate) fn trace_block(
+    scene: &Scene,
+    window: &Window,
+    block: Block,
+    control: &Control,
+) -> Result<(Vec<Photon>, Tally), RenderError> {
+    let emission = Emission::new(scene, window);
+    let batches = (0..block.count.div_ceil(BATCH))
+        .into_par_iter()
+        .map(|batch| {
+            control.check()?;
+            let end = ((batch + 1) * BATCH).min(block.count);
+            Ok(trace_batch(scene, &emission, block, batch * BATCH..end))
+        })
+        .collect::<Result<Vec<_>, RenderError>>()?;
+    let mut photons = Vec::with_capacity(batches.iter().map(|(p, _)| p.len()).sum());
+    let mut tally = Tally::default();
+    for (mut found, part) in batches {
+        photons.append(&mut found);
+        tally.add(&part);
+    }
+    Ok((photons, tally))
+}
+
+fn trace_batch(
+    scene: &Scene,
+    emission: &Emission,
+    block: Block,
+    points: std::ops::Range<u32>,
+) -> (Vec<Photon>, Tally) {
+    let mut photons = Vec::with_capacity(points.len());
+    let mut tally = Tally::default();
+    let share = 1.0 / block.count as f32;
+    for i in points {
+        let sample = SamplePoint::new(block.seed, block.first.wrapping_add(i));
+        tally.sent += 1;
+        let Some(mut photon) = emission.sample(sample) else { continue };
+        photon.power *= share;
+        tally.energy.emitted += photon.power.as_dvec3();
+        if let Fate::Stored(stored) = walk(scene, emission.caster(), photon, sample, &mut tally) {
+            photons.push(stored);
+        }
+    }
+    (photons, tally)
+}

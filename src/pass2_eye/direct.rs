@@ -1,0 +1,118 @@
+//! Pass 2, `LD`: light that reaches a D straight from the lights, by shadow rays.
+
+use crate::geometry::{Ray, SurfacePoint, offset_origin};
+use crate::sampling::{SamplePoint, cosine_hemisphere};
+use crate::scene::{Light, QuadLight, Scene};
+use glam::Vec3;
+use std::f32::consts::PI;
+
+mod spherical_rectangle;
+
+use spherical_rectangle::SphericalRectangle;
+
+/// The surface that is lit, on the side that is seen.
+pub(super) struct Receiver<'a> {
+    pub(super) surface: &'a SurfacePoint,
+    /// Normal on the side that is seen.
+    pub(super) normal: Vec3,
+}
+
+/// A direction from which light may come.
+struct Incident {
+    /// Unit vector to the light.
+    direction: Vec3,
+    /// Where the light is, to the precision of the shadow ray; infinity for a direction.
+    distance: f32,
+    /// Irradiance it gives if nothing is in between, W·m⁻².
+    irradiance: Vec3,
+}
+
+/// Irradiance of all lights at a D, one shadow ray each.
+pub(super) fn direct_light(
+    scene: &Scene,
+    receiver: &Receiver<'_>,
+    sample: SamplePoint,
+    shadow_rays: &mut u64,
+) -> Vec3 {
+    let mut sum = Vec3::ZERO;
+    for (i, light) in scene.lights.iter().enumerate() {
+        let sample = if i == 0 { sample } else { sample.branch(i as u64) };
+        let incident = match light {
+            Light::Point { position, intensity } => from_point(receiver, *position, *intensity),
+            Light::Directional { direction, irradiance } => from_afar(receiver, *direction, *irradiance),
+            Light::Quad(quad) => from_quad(receiver, quad, sample),
+        };
+        sum += visible(scene, receiver, incident, shadow_rays);
+    }
+    if scene.environment != Vec3::ZERO {
+        let direction = cosine_hemisphere(receiver.normal, sample.get_2d(4));
+        // The density cosθ/π cancels the cosine.
+        let irradiance = scene.environment * PI;
+        let incident = Incident { direction, distance: f32::INFINITY, irradiance };
+        sum += visible(scene, receiver, Some(incident), shadow_rays);
+    }
+    sum
+}
+
+/// The irradiance if nothing is in the way. S surfaces are in the way too: what comes through them is the
+/// photons' part.
+fn visible(scene: &Scene, receiver: &Receiver<'_>, incident: Option<Incident>, rays: &mut u64) -> Vec3 {
+    let Some(incident) = incident else { return Vec3::ZERO };
+    if incident.irradiance.max_element() <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let surface = receiver.surface;
+    let origin = offset_origin(surface.point, surface.error, receiver.normal, incident.direction);
+    *rays += 1;
+    if scene.geometry.any_hit(&Ray::new(origin, incident.direction), incident.distance) {
+        return Vec3::ZERO;
+    }
+    incident.irradiance
+}
+
+fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Option<Incident> {
+    let to = position - receiver.surface.point;
+    let distance2 = to.length_squared();
+    let distance = distance2.sqrt();
+    // A light on the surface itself lights nothing: no direction leads to it.
+    if distance <= receiver.surface.error {
+        return None;
+    }
+    let direction = to / distance;
+    let cosine = receiver.normal.dot(direction);
+    let irradiance = intensity * (cosine.max(0.0) / distance2);
+    (cosine > 0.0).then_some(Incident { direction, distance: short_of(distance), irradiance })
+}
+
+fn from_afar(receiver: &Receiver<'_>, direction: Vec3, irradiance: Vec3) -> Option<Incident> {
+    let cosine = -receiver.normal.dot(direction);
+    (cosine > 0.0).then_some(Incident {
+        direction: -direction,
+        distance: f32::INFINITY,
+        irradiance: irradiance * cosine,
+    })
+}
+
+/// A direction to the rectangle uniform in solid angle, so that near and slanting lights are no noisier than
+/// the cosine at the receiver.
+fn from_quad(receiver: &Receiver<'_>, quad: &QuadLight, sample: SamplePoint) -> Option<Incident> {
+    let from = receiver.surface.point;
+    if (from - quad.center).dot(quad.normal) <= 0.0 {
+        return None;
+    }
+    let rectangle = SphericalRectangle::new(quad, from)?;
+    let target = rectangle.sample(sample.get_2d(2));
+    let error = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element() * f32::EPSILON;
+    let target = offset_origin(target, 4.0 * error, quad.normal, quad.normal);
+    let to = target - from;
+    let distance = to.length();
+    let direction = to.try_normalize()?;
+    let cosine = receiver.normal.dot(direction);
+    let irradiance = quad.radiance * (cosine.max(0.0) * rectangle.solid_angle);
+    (cosine > 0.0).then_some(Incident { direction, distance: short_of(distance), irradiance })
+}
+
+/// A few ulps less, so that rounding of the distance cannot put the shadow ray's end behind the light.
+fn short_of(distance: f32) -> f32 {
+    distance * (1.0 - 4.0 * f32::EPSILON)
+}

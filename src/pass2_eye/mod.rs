@@ -1,0 +1,105 @@
+//! Pass 2, `…E`: rays backward from the eye; each class of paths in its own layer.
+
+mod direct;
+mod specular;
+
+pub use specular::EyeCounts;
+
+use crate::film::{PixelSums, RoundFilm};
+use crate::pass1_light::RoundPhotons;
+use crate::plan::Plan;
+use crate::render::{Control, RenderError};
+use crate::sampling::{SamplePoint, hash};
+use crate::scene::Scene;
+use glam::Vec2;
+use rayon::prelude::*;
+use specular::EyeWalk;
+
+/// Side of the square of pixels that is one unit of parallel work; neighbouring look-ups share the cache.
+const TILE: u32 = 16;
+
+/// Everything pass 2 reads.
+pub struct EyeContext<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// What is computed.
+    pub plan: &'a Plan,
+    /// This round's photons, if pass 1 ran.
+    pub photons: Option<&'a RoundPhotons>,
+    /// Number of the round.
+    pub round: u32,
+}
+
+/// Traces this round's eye samples of every pixel, in two independent halves.
+///
+/// # Errors
+/// [`RenderError::Cancelled`], or [`RenderError::NotFinite`] with the pixel that shows it.
+pub fn trace_image(
+    context: &EyeContext<'_>,
+    control: &Control,
+) -> Result<(RoundFilm, EyeCounts), RenderError> {
+    let image = context.scene.image;
+    let (across, down) = (image.width.div_ceil(TILE), image.height.div_ceil(TILE));
+    let tiles = (0..across * down)
+        .into_par_iter()
+        .map(|tile| {
+            control.check()?;
+            let traced = trace_tile(context, tile % across * TILE, tile / across * TILE);
+            control.tile_done(across * down);
+            traced
+        })
+        .collect::<Result<Vec<_>, RenderError>>()?;
+    let mut film = RoundFilm::new(image.width, image.height);
+    let mut counts = EyeCounts::default();
+    for tile in tiles {
+        counts.add(&tile.counts);
+        film.put(tile.x, tile.y, tile.width, &tile.pixels);
+    }
+    Ok((film, counts))
+}
+
+struct Tile {
+    x: u32,
+    y: u32,
+    width: u32,
+    pixels: Vec<PixelSums>,
+    counts: EyeCounts,
+}
+
+fn trace_tile(context: &EyeContext<'_>, x: u32, y: u32) -> Result<Tile, RenderError> {
+    let image = context.scene.image;
+    let (width, height) = (TILE.min(image.width - x), TILE.min(image.height - y));
+    let mut walk = EyeWalk::new(context);
+    let mut pixels = Vec::with_capacity((width * height) as usize);
+    for py in y..y + height {
+        for px in x..x + width {
+            let sums = trace_pixel(context, &mut walk, px, py);
+            if let Some(class) = sums.not_finite() {
+                return Err(RenderError::NotFinite { x: px, y: py, round: context.round, class });
+            }
+            pixels.push(sums);
+        }
+    }
+    Ok(Tile { x, y, width, pixels, counts: walk.counts })
+}
+
+/// One pixel's samples of this round in both halves, averaged per half.
+fn trace_pixel(context: &EyeContext<'_>, walk: &mut EyeWalk<'_>, x: u32, y: u32) -> PixelSums {
+    let mut sums = PixelSums::default();
+    let per_round = context.plan.eye_samples;
+    for half in 0..2 {
+        let seed = pixel_seed(context.scene.render.seed, x, y, half);
+        for i in 0..per_round {
+            let sample = SamplePoint::new(seed, context.round.wrapping_mul(per_round).wrapping_add(i));
+            let raster = Vec2::new(x as f32, y as f32) + sample.get_2d(0);
+            walk.trace(raster, half as usize, sample, &mut sums.halves[half as usize]);
+        }
+    }
+    sums.scale(1.0 / per_round as f32);
+    sums
+}
+
+fn pixel_seed(seed: u64, x: u32, y: u32, half: u32) -> u64 {
+    const PASS_2: u64 = 2;
+    hash(hash(hash(seed, PASS_2), u64::from(x) << 32 | u64::from(y)), u64::from(half))
+}

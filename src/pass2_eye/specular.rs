@@ -1,0 +1,201 @@
+//! Pass 2, `S*E`: from the eye through mirrors and glass to every D or emitter; there the three classes
+//! are added up.
+//!
+//! At glass both ways are followed while both are strong; a weak branch is picked by chance instead, and a
+//! very weak one plays roulette, so that a scene of many glass balls costs rays in proportion to what they
+//! still add.
+
+use super::EyeContext;
+use super::direct::{Receiver, direct_light};
+use crate::film::ClassSums;
+use crate::geometry::{Hit, Ray, offset_origin};
+use crate::light_path::PathClass;
+use crate::optics::{self, Interaction, Outcome};
+use crate::photon_map::Lookup;
+use crate::sampling::SamplePoint;
+use crate::scene::{Light, Material, Texture};
+use glam::{Vec2, Vec3};
+
+/// Both ways are followed while each still carries this share of the pixel.
+const SPLIT_ABOVE: f32 = 0.02;
+
+/// A branch that carries less plays roulette.
+const ROULETTE_BELOW: f32 = 0.01;
+
+/// More S than this end the walk: between two mirrors of reflectance 0.95 it then carries 3 %.
+const MAX_BOUNCES: u32 = 64;
+
+/// Sobol dimensions 0 and 1 place the sample in the pixel, 2 to 5 light the D; then two per S.
+const FIRST_EVENT_DIMENSION: u32 = 6;
+
+/// What the rays of pass 2 did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EyeCounts {
+    /// Rays from the eye and from S surfaces.
+    pub eye_rays: u64,
+    /// Shadow rays.
+    pub shadow_rays: u64,
+    /// Look-ups in the photon map.
+    pub lookups: u64,
+    /// Branches ended by the bounce limit.
+    pub cut: u64,
+}
+
+impl EyeCounts {
+    /// Adds another's counts.
+    pub fn add(&mut self, other: &Self) {
+        self.eye_rays += other.eye_rays;
+        self.shadow_rays += other.shadow_rays;
+        self.lookups += other.lookups;
+        self.cut += other.cut;
+    }
+}
+
+/// Follows eye rays; owns the stack of branches yet to follow.
+pub(super) struct EyeWalk<'a> {
+    context: &'a EyeContext<'a>,
+    spread: f32,
+    stack: Vec<Branch>,
+    /// The eye sample that is being followed.
+    half: usize,
+    sample: SamplePoint,
+    pub(super) counts: EyeCounts,
+}
+
+/// A ray on its way from the eye.
+#[derive(Clone, Copy)]
+struct Branch {
+    ray: Ray,
+    throughput: Vec3,
+    bounces: u32,
+    /// Length of the way from the eye.
+    travelled: f32,
+    /// Which ways were taken: one bit per S, after a leading 1.
+    key: u64,
+}
+
+impl<'a> EyeWalk<'a> {
+    pub(super) fn new(context: &'a EyeContext<'a>) -> Self {
+        let spread = context.scene.camera.pixel_spread();
+        let sample = SamplePoint::new(0, 0);
+        Self { context, spread, stack: Vec::new(), half: 0, sample, counts: EyeCounts::default() }
+    }
+
+    /// Adds what arrives along one eye ray to the classes' sums.
+    pub(super) fn trace(&mut self, raster: Vec2, half: usize, sample: SamplePoint, sums: &mut ClassSums) {
+        let ray = self.context.scene.camera.ray(raster);
+        (self.half, self.sample) = (half, sample);
+        self.stack.clear();
+        self.stack.push(Branch { ray, throughput: Vec3::ONE, bounces: 0, travelled: 0.0, key: 1 });
+        while let Some(branch) = self.stack.pop() {
+            self.follow(branch, sums);
+        }
+    }
+
+    fn follow(&mut self, branch: Branch, sums: &mut ClassSums) {
+        let scene = self.context.scene;
+        self.counts.eye_rays += 1;
+        let Some(hit) = scene.geometry.closest_hit(&branch.ray) else {
+            sums.add(PathClass::Emitted, branch.throughput * scene.environment);
+            return;
+        };
+        match scene.material_of(hit.object) {
+            Material::Diffuse { albedo } => self.arrive(&branch, &hit, albedo, sums),
+            Material::Mirror { reflectance } => {
+                let interaction = optics::mirror(branch.ray.direction, &hit.surface, *reflectance);
+                self.scatter(&branch, &hit, &interaction);
+            }
+            Material::Glass { ior } => {
+                let interaction = optics::glass(branch.ray.direction, &hit.surface, *ior);
+                self.scatter(&branch, &hit, &interaction);
+            }
+        }
+    }
+
+    /// Puts the ways that leave an S onto the stack.
+    fn scatter(&mut self, branch: &Branch, hit: &Hit, interaction: &Interaction) {
+        if branch.bounces >= MAX_BOUNCES {
+            self.counts.cut += 1;
+            return;
+        }
+        let dimension = FIRST_EVENT_DIMENSION + 2 * branch.bounces;
+        match (interaction.reflected, interaction.refracted) {
+            (Some(a), Some(b)) => {
+                let weight = |o: &Outcome| (branch.throughput * o.fraction).max_element();
+                if weight(&a).min(weight(&b)) >= SPLIT_ABOVE {
+                    self.push(branch, hit, &b, 1.0);
+                    self.push(branch, hit, &a, 1.0);
+                    return;
+                }
+                let share = weight(&a) / (weight(&a) + weight(&b));
+                let u = self.sample.branch(branch.key).get(dimension);
+                let (outcome, probability) = if u < share { (a, share) } else { (b, 1.0 - share) };
+                self.push(branch, hit, &outcome, probability);
+            }
+            (Some(only), None) | (None, Some(only)) => self.push(branch, hit, &only, 1.0),
+            (None, None) => {}
+        }
+    }
+
+    fn push(&mut self, branch: &Branch, hit: &Hit, outcome: &Outcome, probability: f32) {
+        let mut throughput = branch.throughput * outcome.fraction * (outcome.radiance_scale / probability);
+        let strength = throughput.max_element();
+        if strength < ROULETTE_BELOW {
+            let survival = strength / ROULETTE_BELOW;
+            let u = self.sample.branch(branch.key).get(FIRST_EVENT_DIMENSION + 2 * branch.bounces + 1);
+            if u >= survival {
+                return;
+            }
+            throughput /= survival;
+        }
+        let surface = &hit.surface;
+        let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
+        let way = u64::from(outcome.event == optics::Event::Refraction);
+        self.stack.push(Branch {
+            ray: Ray::new(origin, outcome.direction),
+            throughput,
+            bounces: branch.bounces + 1,
+            travelled: branch.travelled + hit.t,
+            key: branch.key << 1 | way,
+        });
+    }
+
+    /// At a D: what it emits, the direct light and the photons.
+    fn arrive(&mut self, branch: &Branch, hit: &Hit, albedo: &Texture, sums: &mut ClassSums) {
+        let scene = self.context.scene;
+        let backside = branch.ray.direction.dot(hit.surface.normal) > 0.0;
+        if let Some(light) = scene.objects[hit.object.index()].emitter
+            && !backside
+            && let Light::Quad(quad) = &scene.lights[light.index()]
+        {
+            sums.add(PathClass::Emitted, branch.throughput * quad.radiance);
+        }
+        let albedo = albedo.eval(hit.surface.uv);
+        if albedo == Vec3::ZERO {
+            return;
+        }
+        // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
+        let weight = branch.throughput * albedo / std::f32::consts::PI;
+        let normal = if backside { -hit.surface.normal } else { hit.surface.normal };
+        let receiver = Receiver { surface: &hit.surface, normal };
+        let sample = self.sample.branch(branch.key);
+        let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
+        sums.add(PathClass::Direct, weight * direct);
+        if let Some(photons) = self.context.photons {
+            let radius = self.kernel_radius(branch, hit);
+            let lookup = Lookup { point: hit.surface.point, normal, sheet: hit.sheet, radius };
+            self.counts.lookups += 1;
+            let caustic = photons.maps[self.half].irradiance(&lookup).value;
+            if caustic != Vec3::ZERO {
+                let mass = scene.geometry.kernel_mass(hit.sheet, hit.surface.point, radius);
+                sums.add(PathClass::Caustic, weight * caustic / mass);
+            }
+        }
+    }
+
+    /// The density estimate's radius: in proportion to the pixel's own width on the surface.
+    fn kernel_radius(&self, branch: &Branch, hit: &Hit) -> f32 {
+        let pixel = (branch.travelled + hit.t) * self.spread;
+        pixel * self.context.plan.kernel_pixels
+    }
+}

@@ -1,0 +1,202 @@
+//! Photons and the kd-tree that finds them again; the only file that names `kiddo`.
+
+use crate::geometry::SheetId;
+use glam::{Mat3, Vec3};
+use kiddo::leaf_strategy::FlatVec;
+use kiddo::{Eytzinger, KdTree, SquaredEuclidean};
+
+/// Light that has come to rest on a surface, on its way along `LS+D`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Photon {
+    /// Where it lies.
+    pub position: Vec3,
+    /// Unit direction in which it travelled.
+    pub direction: Vec3,
+    /// Unit geometric normal of the surface there.
+    pub normal: Vec3,
+    /// The sheet of surface it lies on.
+    pub sheet: SheetId,
+    /// Power per channel, W.
+    pub power: Vec3,
+}
+
+/// What a photon is in the tree besides its position: 24 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+struct Stored {
+    power: [f32; 3],
+    sheet: u32,
+    direction: u32,
+    normal: u32,
+}
+
+type Tree = KdTree<f32, Stored, Eytzinger, FlatVec<f32, Stored, 3, 32>, 3, 32>;
+
+/// Bytes held per photon in the tree: twelve of position and 24 of [`Stored`]; the tree's arrays keep up to
+/// half as much again in reserve.
+pub const BYTES_PER_PHOTON: u64 = 36;
+
+/// A kd-tree over photons.
+///
+/// The tree splits its axes in turn, so that photons on an axis-parallel floor would share one coordinate
+/// and leave leaves of any size; all coordinates are turned by one fixed rotation first.
+pub struct PhotonMap {
+    tree: Option<Tree>,
+    count: usize,
+}
+
+/// Where and how wide to look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lookup {
+    /// The surface point.
+    pub point: Vec3,
+    /// Unit normal there, on the side that is seen.
+    pub normal: Vec3,
+    /// The sheet of surface the point lies on.
+    pub sheet: SheetId,
+    /// Radius of the kernel, m.
+    pub radius: f32,
+}
+
+/// What a look-up found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Irradiance {
+    /// Kernel-weighted sum of photon powers per area, W·m⁻².
+    pub value: Vec3,
+    /// How many photons contributed.
+    pub photons: u32,
+}
+
+/// The fixed rotation: every entry is a third or two, none near zero.
+const ROTATION: Mat3 = Mat3::from_cols(
+    Vec3::new(2.0 / 3.0, 2.0 / 3.0, -1.0 / 3.0),
+    Vec3::new(-1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0),
+    Vec3::new(2.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0),
+);
+
+/// Normals further apart than this belong to another face of the sheet (cosine of 45°).
+const NORMAL_COSINE: f32 = 0.707;
+
+impl PhotonMap {
+    /// Builds the tree; photons with a coordinate or power that is not finite are left out.
+    #[must_use]
+    pub fn build(photons: &[Photon]) -> Self {
+        let usable: Vec<&Photon> =
+            photons.iter().filter(|p| p.position.is_finite() && p.power.is_finite()).collect();
+        if usable.is_empty() {
+            return Self { tree: None, count: 0 };
+        }
+        let entries: Vec<(Stored, [f32; 3])> =
+            usable.iter().map(|p| (Stored::from(*p), (ROTATION * p.position).to_array())).collect();
+        let tree = Tree::builder().build_from_entries(&entries).ok();
+        let count = if tree.is_some() { entries.len() } else { 0 };
+        Self { tree, count }
+    }
+
+    /// Number of photons in the tree.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// True if there are no photons.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Density estimate at a point with the Epanechnikov kernel 2/(πr²) (1 - d²/r²), which is unbiased where
+    /// the density is uniform. Only photons on the same sheet, with a similar normal, arriving on the side
+    /// that is seen, and near the tangent plane count.
+    #[must_use]
+    pub fn irradiance(&self, lookup: &Lookup) -> Irradiance {
+        let mut found = Irradiance::default();
+        let Some(tree) = &self.tree else { return found };
+        let radius2 = lookup.radius * lookup.radius;
+        // A radius of no size (or NaN) holds no photons and has no density.
+        if !(radius2 > 0.0 && radius2.is_finite()) {
+            return found;
+        }
+        let center = ROTATION * lookup.point;
+        let normal = ROTATION * lookup.normal;
+        let mut sum = Vec3::ZERO;
+        tree.query(&center.to_array())
+            .within::<SquaredEuclidean<f32>>(radius2)
+            .unsorted()
+            .with_points()
+            .visit(|hit| {
+                let photon = hit.item;
+                let same_sheet = photon.sheet == lookup.sheet.0;
+                let height = (Vec3::from_array(hit.point) - center).dot(normal);
+                // The photon's plane may tilt by 45° over the kernel's radius at most.
+                let near_plane = height * height <= 0.5 * hit.distance + radius2 * 1e-4;
+                if same_sheet && near_plane && photon.arrives_on(lookup.normal) {
+                    sum += Vec3::from_array(photon.power) * (1.0 - hit.distance / radius2);
+                    found.photons += 1;
+                }
+            });
+        found.value = sum * (2.0 / (std::f32::consts::PI * radius2));
+        found
+    }
+}
+
+impl From<&Photon> for Stored {
+    fn from(photon: &Photon) -> Self {
+        Self {
+            power: photon.power.to_array(),
+            sheet: photon.sheet.0,
+            direction: encode_direction(photon.direction),
+            normal: encode_direction(photon.normal),
+        }
+    }
+}
+
+impl Stored {
+    /// True if the photon came from the side of `normal` and its surface faces the same way.
+    #[inline]
+    fn arrives_on(&self, normal: Vec3) -> bool {
+        let aligned = decode_direction(self.normal).dot(normal).abs() > NORMAL_COSINE;
+        aligned && decode_direction(self.direction).dot(normal) < 0.0
+    }
+}
+
+/// Octahedral encoding of a unit vector in 2 × 16 bits (Cigolle et al. 2014); error below 4e-5 rad.
+fn encode_direction(v: Vec3) -> u32 {
+    let p = v / v.abs().element_sum();
+    let (x, y) = if p.z >= 0.0 {
+        (p.x, p.y)
+    } else {
+        ((1.0 - p.y.abs()) * 1.0_f32.copysign(p.x), (1.0 - p.x.abs()) * 1.0_f32.copysign(p.y))
+    };
+    let quantise = |c: f32| ((c.clamp(-1.0, 1.0) * 32767.0).round() as i16) as u16;
+    u32::from(quantise(x)) | u32::from(quantise(y)) << 16
+}
+
+fn decode_direction(code: u32) -> Vec3 {
+    let part = |bits: u32| f32::from(bits as u16 as i16) / 32767.0;
+    let (x, y) = (part(code), part(code >> 16));
+    let z = 1.0 - x.abs() - y.abs();
+    let fold = (-z).max(0.0);
+    Vec3::new(x - fold.copysign(x), y - fold.copysign(y), z).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_survive_the_octahedral_code() {
+        for i in 0..1000 {
+            let u = crate::sampling::SamplePoint::new(5, i).get_2d(0);
+            let v = crate::sampling::uniform_sphere(u);
+            let back = decode_direction(encode_direction(v));
+            assert!((back - v).length() < 8e-5, "{v} {back}");
+        }
+        assert_eq!(decode_direction(encode_direction(Vec3::NEG_Z)).z, -1.0);
+    }
+
+    #[test]
+    fn the_rotation_is_a_rotation() {
+        assert!((ROTATION * ROTATION.transpose()).abs_diff_eq(Mat3::IDENTITY, 1e-6));
+        assert!((ROTATION.determinant() - 1.0).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,282 @@
+//! The plan: what this scene needs, what is left out, and why.
+
+use crate::film::Film;
+use crate::light_path::Bounce;
+use crate::pass1_light::{self, Block, Budget, Source, Tally, Window};
+use crate::photon_map;
+use crate::render::Control;
+use crate::sampling::hash;
+use crate::scene::{Light, Material, Paths, Scene};
+use glam::Vec3;
+
+/// What a render will do. A pure function of the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Photon windows and their budgets; empty if pass 1 does not run.
+    pub photons: Vec<Budget>,
+    /// Eye samples per pixel, half and round.
+    pub eye_samples: u32,
+    /// Radius of the density estimate in pixels at the receiver.
+    pub kernel_pixels: f32,
+    /// Each choice with its reason.
+    pub decisions: Vec<Decision>,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+    /// Estimated memory at the peak.
+    pub memory_bytes: u64,
+}
+
+/// One choice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Decision {
+    /// What is decided on.
+    pub topic: &'static str,
+    /// True if it costs anything in this render.
+    pub runs: bool,
+    /// What was chosen.
+    pub choice: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// Something the user should know, with a stable code.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// Stable name of the kind of warning.
+    pub code: &'static str,
+    /// The warning in words.
+    pub message: String,
+}
+
+/// Photons of the first pilot per window; tried again with sixteen times as many where none arrived.
+const PILOT_LOG2: u32 = 12;
+
+/// Least photons per window, half and round.
+const LEAST_LOG2: u32 = 8;
+
+/// Most photons per half and round in all: bounds the memory of a round.
+const MOST_LOG2: u32 = 21;
+
+/// The kernel's radius: about a pixel, so that the estimate blurs no more than the pixel itself does.
+const KERNEL_PIXELS: f32 = 1.5;
+
+/// A window and what its pilot found.
+struct Pilot {
+    window: Window,
+    tally: Tally,
+    /// Photons sent.
+    sent: u32,
+}
+
+impl Plan {
+    /// Decides what this scene needs; sends a few pilot photons to find out.
+    #[must_use]
+    pub fn new(scene: &Scene) -> Self {
+        let mut plan = Self {
+            photons: Vec::new(),
+            eye_samples: 1,
+            kernel_pixels: KERNEL_PIXELS,
+            decisions: Vec::new(),
+            warnings: Vec::new(),
+            memory_bytes: 0,
+        };
+        plan.decide_pass_1(scene);
+        plan.decide_direct(scene);
+        plan.decide_structure(scene);
+        plan.decide("lens", false, "pinhole", "the camera has no aperture: no lens samples");
+        plan.decide("time", false, "one instant", "nothing moves: no time samples");
+        plan.decide("colour", true, "RGB", "nothing disperses light: no wavelengths");
+        plan.memory_bytes = plan.estimate_memory(scene);
+        plan
+    }
+
+    fn decide(
+        &mut self,
+        topic: &'static str,
+        runs: bool,
+        choice: impl Into<String>,
+        reason: impl Into<String>,
+    ) {
+        self.decisions.push(Decision { topic, runs, choice: choice.into(), reason: reason.into() });
+    }
+
+    fn warn(&mut self, code: &'static str, message: impl Into<String>) {
+        self.warnings.push(Warning { code, message: message.into() });
+    }
+
+    fn decide_pass_1(&mut self, scene: &Scene) {
+        if scene.render.paths == Paths::Whitted {
+            self.decide("pass 1", false, "no photons", "the paths asked for, LS*E|LDS*E, hold no caustic");
+            return;
+        }
+        let specular =
+            scene.objects.iter().any(|o| scene.materials[o.material.index()].bounce() == Bounce::Specular);
+        if !specular {
+            self.decide("pass 1", false, "no photons", "no object is a mirror or glass: LS+DS*E is empty");
+            return;
+        }
+        if !scene.objects.iter().any(|o| receives(&scene.materials[o.material.index()])) {
+            self.decide(
+                "pass 1",
+                false,
+                "no photons",
+                "no surface can show a caustic: all are specular or black",
+            );
+            self.warn(
+                "no_receiver",
+                "there is no diffuse surface that is not black, so no caustic can be seen",
+            );
+            return;
+        }
+        let windows = pass1_light::windows(scene);
+        if windows.is_empty() {
+            self.decide("pass 1", false, "no photons", "no light gives light");
+            return;
+        }
+        let pilots: Vec<Pilot> =
+            windows.into_iter().enumerate().map(|(i, w)| pilot(scene, w, i as u64)).collect();
+        self.budget(scene, pilots);
+    }
+
+    /// Shares the photons of a round among the windows in proportion to the light they deliver.
+    fn budget(&mut self, scene: &Scene, pilots: Vec<Pilot>) {
+        let delivered = |p: &Pilot| p.tally.energy.stored.max_element();
+        let total: f64 = pilots.iter().map(delivered).sum();
+        let all = pilots.len();
+        if pilots.iter().all(|p| p.tally.hit_caster == 0) {
+            self.decide("pass 1", false, "no photons", "no light reaches a mirror or glass");
+            self.warn(
+                "no_photon_hit_specular",
+                format!("of {} pilot photons none reached a specular object", sent(&pilots)),
+            );
+            return;
+        }
+        if total <= 0.0 {
+            let energy = |f: fn(&Tally) -> f64| pilots.iter().map(|p| f(&p.tally)).sum::<f64>();
+            let escaped = energy(|t| t.energy.escaped.max_element());
+            let absorbed = energy(|t| t.energy.absorbed.max_element());
+            self.decide(
+                "pass 1",
+                false,
+                "no photons",
+                "no light that mirrors or glass throw lands on a surface",
+            );
+            self.warn(
+                "no_photon_stored",
+                format!("pilot photons met specular objects, but none landed: {escaped:.3e} W escaped, {absorbed:.3e} W were absorbed"),
+            );
+            return;
+        }
+        let pixels = u64::from(scene.image.width) * u64::from(scene.image.height);
+        let per_round = pixels.next_power_of_two().ilog2().clamp(LEAST_LOG2, MOST_LOG2);
+        for pilot in pilots {
+            let share = delivered(&pilot) / total;
+            if share == 0.0 {
+                continue;
+            }
+            // A power of two at least as large as the share: blocks of the sequence stay aligned.
+            let log2_block = (f64::from(per_round) + share.log2()).ceil().max(f64::from(LEAST_LOG2)) as u32;
+            self.photons.push(Budget { window: pilot.window, log2_block });
+        }
+        let sent: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
+        let kept = self.photons.len();
+        self.decide(
+            "pass 1",
+            true,
+            format!("{sent} photons a round through {kept} windows"),
+            format!("{kept} of {all} pairs of light and specular object throw light onto a surface; each gets photons by the light it delivers"),
+        );
+    }
+
+    fn decide_direct(&mut self, scene: &Scene) {
+        let delta = |l: &Light| matches!(l, Light::Point { .. } | Light::Directional { .. });
+        let lit = scene.lights.iter().filter(|l| !l.is_dark()).count();
+        let dark = scene.lights.len() - lit;
+        if dark > 0 {
+            self.warn("zero_power_light", format!("{dark} of {} lights give no light", scene.lights.len()));
+        }
+        if lit == 0 && scene.environment == Vec3::ZERO {
+            self.decide("direct light", false, "nothing", "no light gives light");
+            self.warn("no_light", "no light gives light: the picture is black");
+            return;
+        }
+        let (choice, reason) = if scene.lights.iter().all(delta) {
+            ("one shadow ray per light", "the lights have no size: nothing to sample")
+        } else {
+            (
+                "one shadow ray per light to a sampled point",
+                "area lights are sampled by solid angle, Owen-scrambled Sobol",
+            )
+        };
+        self.decide("direct light", true, choice, reason);
+        if scene.environment != Vec3::ZERO {
+            self.decide("environment", true, "one ray by the cosine", "the environment gives light");
+        } else {
+            self.decide("environment", false, "no rays", "the environment is black");
+        }
+    }
+
+    fn decide_structure(&mut self, scene: &Scene) {
+        let count = scene.geometry.primitive_count();
+        let structure = scene.geometry.structure();
+        let reason = match structure {
+            "list" => format!("{count} primitives: testing each is quicker than walking a tree"),
+            _ => format!("{count} primitives"),
+        };
+        self.decide("structure", structure != "list", structure, reason);
+    }
+
+    fn estimate_memory(&self, scene: &Scene) -> u64 {
+        let photons: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
+        // While a tree is built its photons stand in memory in three forms: as traced (56 bytes), as entries
+        // and in the tree's arrays, which double as they grow.
+        let per_photon = 56 + 3 * photon_map::BYTES_PER_PHOTON;
+        // The sum, the round and the tiles of the round before they are put in place.
+        let films = 3 * Film::bytes(scene.image.width, scene.image.height);
+        scene.geometry.memory_bytes() + films + photons * per_photon
+    }
+}
+
+fn receives(material: &Material) -> bool {
+    match material {
+        Material::Diffuse { albedo } => !albedo.is_black(),
+        Material::Mirror { .. } | Material::Glass { .. } => false,
+    }
+}
+
+fn sent(pilots: &[Pilot]) -> u64 {
+    pilots.iter().map(|p| u64::from(p.sent)).sum()
+}
+
+/// Sends a few photons through a window. The count is bounded: a window that delivers nothing is given up.
+fn pilot(scene: &Scene, window: Window, index: u64) -> Pilot {
+    const PILOT: u64 = 0;
+    let seed = hash(hash(scene.render.seed, PILOT), index);
+    let run = |log2: u32| {
+        let block = Block { first: 0, count: 1 << log2, seed };
+        pass1_light::trace_block(scene, &window, block, &Control::new()).map(|(_, t)| t).unwrap_or_default()
+    };
+    let mut log2 = PILOT_LOG2;
+    let mut tally = run(log2);
+    if tally.stored == 0 {
+        log2 += 4;
+        tally = run(log2);
+    }
+    Pilot { window, tally, sent: 1 << log2 }
+}
+
+/// A window's source in words.
+#[must_use]
+pub fn source_name(scene: &Scene, source: Source) -> String {
+    match source {
+        Source::Environment => "environment".to_owned(),
+        Source::Light(id) => {
+            let kind = match &scene.lights[id.index()] {
+                Light::Point { .. } => "point",
+                Light::Directional { .. } => "directional",
+                Light::Quad(_) => "quad",
+            };
+            format!("{kind} light {}", id.0)
+        }
+    }
+}

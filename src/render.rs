@@ -1,0 +1,288 @@
+//! The method on one screen: pass 1, the photon maps, pass 2, the film; round after round until a stop.
+
+use crate::film::Film;
+use crate::image_io::LinearImage;
+use crate::light_path::PathClass;
+use crate::pass1_light::{self, Tally};
+use crate::pass2_eye::{self, EyeContext, EyeCounts};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::time::Instant;
+
+mod checkpoint;
+
+pub use checkpoint::CheckpointError;
+
+/// Shared between the renderer and whoever waits for it: cancels, and tells how far the round is.
+#[derive(Debug, Default)]
+pub struct Control {
+    cancelled: AtomicBool,
+    tiles_done: AtomicU32,
+    tiles: AtomicU32,
+}
+
+impl Control {
+    /// A control that lets the render run.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Asks the render to end; it does so within a tile or a batch of photons.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// True once [`Control::cancel`] was called.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    /// How much of the current round's picture is traced, 0..1.
+    #[must_use]
+    pub fn round_fraction(&self) -> f32 {
+        let tiles = self.tiles.load(Ordering::Relaxed).max(1);
+        self.tiles_done.load(Ordering::Relaxed) as f32 / tiles as f32
+    }
+
+    pub(crate) fn check(&self) -> Result<(), RenderError> {
+        if self.is_cancelled() { Err(RenderError::Cancelled) } else { Ok(()) }
+    }
+
+    pub(crate) fn tile_done(&self, of: u32) {
+        self.tiles.store(of, Ordering::Relaxed);
+        self.tiles_done.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn start_round(&self) {
+        self.tiles_done.store(0, Ordering::Relaxed);
+    }
+}
+
+/// Why a round did not finish.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RenderError {
+    /// [`Control::cancel`] was called.
+    #[error("the render was cancelled")]
+    Cancelled,
+    /// A sample gave a number that is not finite; the values replay it.
+    #[error("pixel ({x}, {y}) of round {round} is not finite in the {} layer", class.name())]
+    NotFinite {
+        /// Pixel column.
+        x: u32,
+        /// Pixel row.
+        y: u32,
+        /// The round.
+        round: u32,
+        /// The class of paths.
+        class: PathClass,
+    },
+}
+
+/// What ended a render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopReason {
+    /// The estimated error is within the one asked for.
+    Error,
+    /// The time is used up.
+    Seconds,
+    /// All rounds asked for are done.
+    Rounds,
+    /// The picture has no noise to remove: nothing in it is sampled.
+    Exact,
+}
+
+impl StopReason {
+    /// The reason's name on the wire.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Seconds => "seconds",
+            Self::Rounds => "rounds",
+            Self::Exact => "exact",
+        }
+    }
+}
+
+/// One finished round.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoundReport {
+    /// Number of rounds finished.
+    pub rounds: u32,
+    /// Estimated relative error so far.
+    pub error: Option<f32>,
+    /// Seconds spent rendering so far.
+    pub seconds: f64,
+}
+
+/// Seconds of wall-clock time per part of the method.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seconds {
+    /// Photons and their tree.
+    pub pass1: f64,
+    /// Eye rays.
+    pub pass2: f64,
+}
+
+/// What a render did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderStats {
+    /// Rounds finished.
+    pub rounds: u32,
+    /// What ended it, if it has ended.
+    pub stop_reason: Option<StopReason>,
+    /// Estimated relative error.
+    pub error: Option<f32>,
+    /// Time per pass, summed over rounds.
+    pub seconds: Seconds,
+    /// Photons and their energy (summed over rounds and halves), for each window of the plan.
+    pub windows: Vec<Tally>,
+    /// Rays of pass 2.
+    pub eye: EyeCounts,
+}
+
+/// A render in progress. Rounds are pure functions of scene, plan and number; they are the time slice in
+/// which renders share a machine.
+pub struct Render {
+    scene: Arc<Scene>,
+    plan: Plan,
+    film: Film,
+    seconds: Seconds,
+    windows: Vec<Tally>,
+    eye: EyeCounts,
+}
+
+/// With no limit given at all, this many rounds end a render that never reaches its error.
+const MOST_ROUNDS: u32 = 1 << 20;
+
+/// Fewer rounds tell too little about the error to stop by it.
+const LEAST_ROUNDS: u32 = 2;
+
+impl Render {
+    /// A render that has yet to start.
+    #[must_use]
+    pub fn new(scene: Arc<Scene>, plan: Plan) -> Self {
+        let film = Film::new(scene.image.width, scene.image.height);
+        let windows = vec![Tally::default(); plan.photons.len()];
+        Self { scene, plan, film, seconds: Seconds::default(), windows, eye: EyeCounts::default() }
+    }
+
+    /// Renders the next round, in the rayon pool this is called in.
+    ///
+    /// # Errors
+    /// See [`RenderError`]; the finished rounds stay as they are.
+    pub fn run_round(&mut self, control: &Control) -> Result<RoundReport, RenderError> {
+        control.start_round();
+        let round = self.film.rounds();
+        let start = Instant::now();
+        let photons = if self.plan.photons.is_empty() {
+            None
+        } else {
+            Some(pass1_light::emit_photons(&self.scene, &self.plan.photons, round, control)?)
+        };
+        let pass1 = start.elapsed().as_secs_f64();
+        let context = EyeContext { scene: &self.scene, plan: &self.plan, photons: photons.as_ref(), round };
+        let (film, eye) = pass2_eye::trace_image(&context, control)?;
+        self.film.add_round(&film);
+        self.eye.add(&eye);
+        for (sum, tally) in self.windows.iter_mut().zip(photons.iter().flat_map(|p| &p.tallies)) {
+            sum.add(tally);
+        }
+        self.seconds.pass1 += pass1;
+        self.seconds.pass2 += start.elapsed().as_secs_f64() - pass1;
+        Ok(RoundReport { rounds: self.rounds(), error: self.error_estimate(), seconds: self.seconds() })
+    }
+
+    /// Why the render is finished; `None` while it is not.
+    #[must_use]
+    pub fn stop_reason(&self) -> Option<StopReason> {
+        let stop = self.scene.render.stop;
+        if self.rounds() >= stop.rounds.unwrap_or(MOST_ROUNDS) {
+            return Some(StopReason::Rounds);
+        }
+        if let (Some(target), Some(error)) = (stop.error, self.error_estimate())
+            && self.rounds() >= LEAST_ROUNDS
+            && error <= target
+        {
+            return Some(StopReason::Error);
+        }
+        (self.rounds() > 0 && stop.seconds.is_some_and(|limit| self.seconds() >= limit))
+            .then_some(StopReason::Seconds)
+    }
+
+    /// A guess from the stop rule of how much is done, 0..1.
+    #[must_use]
+    pub fn progress(&self) -> f32 {
+        if self.stop_reason().is_some() {
+            return 1.0;
+        }
+        let stop = self.scene.render.stop;
+        let by_rounds = stop.rounds.map(|n| self.rounds() as f32 / n.max(1) as f32);
+        let by_seconds = stop.seconds.map(|s| (self.seconds() / s) as f32);
+        // Noise falls at least with the root of the effort.
+        let by_error = match (stop.error, self.error_estimate()) {
+            (Some(target), Some(error)) if error > 0.0 => Some((target / error).powi(2)),
+            _ => None,
+        };
+        [by_rounds, by_seconds, by_error].into_iter().flatten().fold(0.0, f32::max).clamp(0.0, 0.99)
+    }
+
+    /// Number of finished rounds.
+    #[must_use]
+    pub fn rounds(&self) -> u32 {
+        self.film.rounds()
+    }
+
+    /// Estimated relative error so far (see [`Film::error_estimate`]).
+    #[must_use]
+    pub fn error_estimate(&self) -> Option<f32> {
+        self.film.error_estimate()
+    }
+
+    /// Seconds spent in [`Render::run_round`].
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.seconds.pass1 + self.seconds.pass2
+    }
+
+    /// The picture so far.
+    #[must_use]
+    pub fn image(&self) -> LinearImage {
+        self.film.image()
+    }
+
+    /// One class of paths so far; the layers add up to the picture.
+    #[must_use]
+    pub fn layer(&self, class: PathClass) -> LinearImage {
+        self.film.layer(class)
+    }
+
+    /// The scene that is rendered.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The plan that is followed.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// What the render did so far.
+    #[must_use]
+    pub fn stats(&self) -> RenderStats {
+        RenderStats {
+            rounds: self.rounds(),
+            stop_reason: self.stop_reason(),
+            error: self.error_estimate(),
+            seconds: self.seconds,
+            windows: self.windows.clone(),
+            eye: self.eye,
+        }
+    }
+}

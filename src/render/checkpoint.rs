@@ -1,0 +1,116 @@
+//! A render in progress as bytes: it continues to the same picture as if it had never stopped.
+
+use super::{Render, Seconds};
+use crate::film::Film;
+use crate::pass1_light::Tally;
+use crate::pass2_eye::EyeCounts;
+use crate::plan::Plan;
+use crate::scene::Scene;
+use glam::DVec3;
+use std::sync::Arc;
+
+/// First bytes of a checkpoint; the digit is the version of the layout.
+const MAGIC: &[u8; 12] = b"nephroid-cp1";
+
+/// Why a checkpoint cannot be continued.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CheckpointError {
+    /// Not a checkpoint, or one of another version.
+    #[error("not a checkpoint of this version")]
+    Unknown,
+    /// Cut short, or of a render with another plan or image size.
+    #[error("the checkpoint does not fit this scene")]
+    Mismatch,
+}
+
+impl Render {
+    /// All finished rounds, as bytes.
+    #[must_use]
+    pub fn checkpoint(&self) -> Vec<u8> {
+        let mut out = MAGIC.to_vec();
+        put_f64(&mut out, self.seconds.pass1);
+        put_f64(&mut out, self.seconds.pass2);
+        let EyeCounts { eye_rays, shadow_rays, lookups, cut } = self.eye;
+        for count in [eye_rays, shadow_rays, lookups, cut, self.windows.len() as u64] {
+            put_u64(&mut out, count);
+        }
+        for tally in &self.windows {
+            put_tally(&mut out, tally);
+        }
+        out.extend(self.film.to_bytes());
+        out
+    }
+
+    /// Continues the render of [`Render::checkpoint`], which was of the same scene and plan.
+    ///
+    /// # Errors
+    /// See [`CheckpointError`].
+    pub fn resume(scene: Arc<Scene>, plan: Plan, checkpoint: &[u8]) -> Result<Self, CheckpointError> {
+        let rest = checkpoint.strip_prefix(MAGIC.as_slice()).ok_or(CheckpointError::Unknown)?;
+        let mut render = Self::new(scene, plan);
+        render.read(rest).ok_or(CheckpointError::Mismatch)?;
+        Ok(render)
+    }
+
+    fn read(&mut self, bytes: &[u8]) -> Option<()> {
+        let mut bytes = bytes;
+        self.seconds = Seconds { pass1: take_f64(&mut bytes)?, pass2: take_f64(&mut bytes)? };
+        self.eye = EyeCounts {
+            eye_rays: take_u64(&mut bytes)?,
+            shadow_rays: take_u64(&mut bytes)?,
+            lookups: take_u64(&mut bytes)?,
+            cut: take_u64(&mut bytes)?,
+        };
+        if take_u64(&mut bytes)? != self.windows.len() as u64 {
+            return None;
+        }
+        for tally in &mut self.windows {
+            *tally = take_tally(&mut bytes)?;
+        }
+        let image = self.scene.image;
+        self.film = Film::from_bytes(image.width, image.height, bytes)?;
+        Some(())
+    }
+}
+
+fn put_u64(out: &mut Vec<u8>, value: u64) {
+    out.extend(value.to_le_bytes());
+}
+
+fn put_f64(out: &mut Vec<u8>, value: f64) {
+    put_u64(out, value.to_bits());
+}
+
+fn take_u64(bytes: &mut &[u8]) -> Option<u64> {
+    let (value, rest) = bytes.split_first_chunk::<8>()?;
+    *bytes = rest;
+    Some(u64::from_le_bytes(*value))
+}
+
+fn take_f64(bytes: &mut &[u8]) -> Option<f64> {
+    take_u64(bytes).map(f64::from_bits)
+}
+
+fn put_tally(out: &mut Vec<u8>, tally: &Tally) {
+    for count in [tally.sent, tally.hit_caster, tally.stored, tally.escaped, tally.cut, tally.rays] {
+        put_u64(out, count);
+    }
+    let e = &tally.energy;
+    for power in [e.emitted, e.stored, e.absorbed, e.escaped, e.cut, e.missed] {
+        power.to_array().into_iter().for_each(|channel| put_f64(out, channel));
+    }
+}
+
+fn take_tally(bytes: &mut &[u8]) -> Option<Tally> {
+    let mut tally = Tally::default();
+    let counts = [&mut tally.sent, &mut tally.hit_caster, &mut tally.stored];
+    for count in counts.into_iter().chain([&mut tally.escaped, &mut tally.cut, &mut tally.rays]) {
+        *count = take_u64(bytes)?;
+    }
+    let e = &mut tally.energy;
+    let powers = [&mut e.emitted, &mut e.stored, &mut e.absorbed, &mut e.escaped, &mut e.cut, &mut e.missed];
+    for power in powers {
+        *power = DVec3::new(take_f64(bytes)?, take_f64(bytes)?, take_f64(bytes)?);
+    }
+    Some(tally)
+}

@@ -1,0 +1,331 @@
+//! The scene file, version 1: exactly what the JSON says, nothing computed.
+//!
+//! Each type here is the one declaration of its JSON: field names, types, limits, defaults.
+
+use super::issue::{IssueCode, Issues};
+use super::json::{Node, Value};
+use super::read::{
+    Context, Decode, Fields, choice, color, count, direction, list, name, named, note_duplicates, object,
+    optional, or, pair, part, point, real, record, reference, required, seed, size2, slots, tagged, triangle,
+    uv,
+};
+use super::{Paths, Tone};
+use std::collections::BTreeSet;
+
+/// The version of the format that is read.
+const VERSION: &str = "1";
+/// Most pixels across or down.
+const MAX_IMAGE_SIDE: u32 = 16_384;
+
+/// Reads a scene file as far as it is right. What is wrong is noted, and missing in the result.
+pub(super) fn read_scene_file(root: &Node<'_>, issues: &mut Issues) -> Option<SceneFile> {
+    let mut cx = Context::new(std::mem::take(issues), material_names(root));
+    note_duplicates(root, &mut cx);
+    let file = Fields::read(root, &mut cx);
+    *issues = cx.issues;
+    file
+}
+
+/// The names of all materials, also of those that are wrong: a reference to them is right.
+fn material_names<'n>(root: &'n Node<'_>) -> BTreeSet<&'n str> {
+    let field = |node: &'n Node<'_>, name: &str| match &node.value {
+        Value::Object(members) => members.iter().find(|m| m.key == name).map(|m| &m.node),
+        _ => None,
+    };
+    match field(root, "materials").map(|node| &node.value) {
+        Some(Value::Object(members)) => members.iter().map(|m| m.key.as_ref()).collect(),
+        _ => BTreeSet::new(),
+    }
+}
+
+record! {
+    /// A whole scene. A part that was wrong is `None` (and has been noted), so that the others can be checked.
+    SceneFile {
+        /// Version of the format.
+        nephroid: Option<()> = part(required(Version)),
+        /// The scene's own name.
+        name: Option<Option<String>> = part(optional(name())),
+        /// Size and tone of the picture.
+        image: Option<Option<ImageFile>> = part(optional(object::<ImageFile>())),
+        /// Where the eye is.
+        camera: Option<CameraFile> = part(required(object::<CameraFile>())),
+        /// Materials by name.
+        materials: Option<Vec<(String, Option<MaterialFile>)>> = part(or(named(object::<MaterialFile>()), Vec::new())),
+        /// All objects.
+        objects: Option<Vec<Option<ObjectFile>>> = part(required(slots(object::<ObjectFile>()))),
+        /// All lights but the environment.
+        lights: Option<Vec<Option<LightFile>>> = part(or(slots(object::<LightFile>()), Vec::new())),
+        /// What surrounds the scene.
+        environment: Option<Option<EnvironmentFile>> = part(optional(object::<EnvironmentFile>())),
+        /// What is asked of the renderer.
+        render: Option<RenderFile> = part(or(object::<RenderFile>(), RenderFile::default())),
+    }
+}
+
+record! {
+    /// Size and tone of the picture.
+    ImageFile {
+        /// Pixels across.
+        width: u32 = or(count("width in pixels", 1, MAX_IMAGE_SIDE), 640),
+        /// Pixels down.
+        height: u32 = or(count("height in pixels", 1, MAX_IMAGE_SIDE), 480),
+        /// Exposure in stops.
+        exposure: f64 = or(real("exposure in stops").between(-64.0, 64.0), 0.0),
+        /// Curve between linear radiance and the display.
+        tone: Tone = or(choice(vec![("linear", Tone::Linear), ("filmic", Tone::Filmic)]), Tone::Linear),
+    }
+}
+
+tagged! {
+    /// A camera.
+    CameraFile {
+        "perspective" => Perspective(PerspectiveFile),
+    }
+}
+
+record! {
+    /// A pinhole camera.
+    PerspectiveFile {
+        /// Position of the pinhole.
+        eye: [f64; 3] = required(point()),
+        /// A point in the middle of the picture.
+        target: [f64; 3] = required(point()),
+        /// The direction that is up in the picture.
+        up: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
+        /// Vertical field of view in degrees.
+        fov: f64 = required(real("vertical field of view in degrees").above(0.0).below(180.0)),
+    }
+}
+
+tagged! {
+    /// A material.
+    MaterialFile {
+        "diffuse" => Diffuse(DiffuseFile),
+        "mirror" => Mirror(MirrorFile),
+        "glass" => Glass(GlassFile),
+    }
+}
+
+record! {
+    /// Lambertian reflection.
+    DiffuseFile {
+        /// Fraction of the light reflected.
+        albedo: AlbedoFile = required(Albedo),
+    }
+}
+
+/// A colour, or a pattern of colours.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum AlbedoFile {
+    /// The same everywhere.
+    Color([f64; 3]),
+    /// `{"checker": {…}}`.
+    Checker(CheckerFile),
+}
+
+record! {
+    /// What stands in an albedo that is an object.
+    PatternFile {
+        /// A checkerboard.
+        checker: CheckerFile = required(object::<CheckerFile>()),
+    }
+}
+
+record! {
+    /// A checkerboard.
+    CheckerFile {
+        /// Colours of the even and the odd squares.
+        colors: [[f64; 3]; 2] = required(pair(color("albedo").fraction())),
+        /// Side of a square, in texture coordinates (metres on a polygon).
+        size: f64 = required(real("side of a square").positive_length()),
+    }
+}
+
+record! {
+    /// A perfect mirror.
+    MirrorFile {
+        /// Fraction of the light reflected.
+        reflectance: [f64; 3] = required(color("reflectance").fraction()),
+    }
+}
+
+record! {
+    /// Smooth glass.
+    GlassFile {
+        /// Index of refraction.
+        ior: f64 = required(real("index of refraction").above(0.0).at_most(100.0)),
+    }
+}
+
+record! {
+    /// An object: a shape made of a material.
+    ObjectFile {
+        /// Name, for reports.
+        name: Option<String> = optional(name()),
+        /// Name of its material.
+        material: String = required(reference()),
+        ..
+        /// Its shape.
+        shape: ShapeFile
+    }
+}
+
+tagged! {
+    /// A shape.
+    ShapeFile {
+        "sphere" => Sphere(SphereFile),
+        "polygon" => Polygon(PolygonFile),
+        "mesh" => Mesh(MeshFile),
+    }
+}
+
+record! {
+    /// A sphere.
+    SphereFile {
+        /// Centre.
+        center: [f64; 3] = required(point()),
+        /// Radius.
+        radius: f64 = required(real("radius in metres").positive_length()),
+    }
+}
+
+record! {
+    /// A planar polygon, convex or not.
+    PolygonFile {
+        /// The outline, anticlockwise seen from the front.
+        vertices: Vec<[f64; 3]> = required(list(3, point())),
+        /// Outlines of holes, in either order.
+        holes: Vec<Vec<[f64; 3]>> = or(list(0, list(3, point())), Vec::new()),
+    }
+}
+
+record! {
+    /// A triangle mesh, here or in a file of its own.
+    MeshFile {
+        /// A PLY or OBJ file.
+        asset: Option<String> = optional(name()),
+        /// Positions of the vertices.
+        positions: Option<Vec<[f64; 3]>> = optional(list(3, point())),
+        /// Three indices of vertices per triangle.
+        triangles: Option<Vec<[u32; 3]>> = optional(list(1, triangle())),
+        /// A normal per vertex.
+        normals: Option<Vec<[f64; 3]>> = optional(list(3, direction())),
+        /// Texture coordinates per vertex.
+        uvs: Option<Vec<[f64; 2]>> = optional(list(3, uv())),
+    }
+}
+
+tagged! {
+    /// A light.
+    LightFile {
+        "point" => Point(PointLightFile),
+        "directional" => Directional(DirectionalLightFile),
+        "quad" => Quad(QuadLightFile),
+    }
+}
+
+record! {
+    /// A light that is a point.
+    PointLightFile {
+        /// Where it is.
+        position: [f64; 3] = required(point()),
+        /// Radiant intensity, W·sr⁻¹.
+        intensity: [f64; 3] = required(color("intensity")),
+    }
+}
+
+record! {
+    /// Parallel light.
+    DirectionalLightFile {
+        /// The direction in which the light travels.
+        direction: [f64; 3] = required(direction()),
+        /// Irradiance on a surface that faces the light, W·m⁻².
+        irradiance: [f64; 3] = required(color("irradiance")),
+    }
+}
+
+record! {
+    /// A rectangle that emits to one side.
+    QuadLightFile {
+        /// Centre.
+        center: [f64; 3] = required(point()),
+        /// Width and height.
+        size: [f64; 2] = required(size2()),
+        /// A point the light faces.
+        towards: [f64; 3] = required(point()),
+        /// Direction of the width; horizontal if left out.
+        edge: Option<[f64; 3]> = optional(direction()),
+        /// Radiance, W·sr⁻¹·m⁻².
+        radiance: [f64; 3] = required(color("radiance")),
+    }
+}
+
+record! {
+    /// What surrounds the scene.
+    EnvironmentFile {
+        /// Radiance, the same from everywhere, W·sr⁻¹·m⁻².
+        radiance: [f64; 3] = required(color("radiance")),
+    }
+}
+
+record! {
+    /// What is asked of the renderer.
+    #[derive(Default)]
+    RenderFile {
+        /// Which light paths are computed.
+        paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
+        /// When the render ends.
+        stop: Option<StopFile> = optional(object::<StopFile>()),
+        /// Seed of every random stream.
+        seed: u64 = or(seed(), 0),
+    }
+}
+
+record! {
+    /// When a render ends: the first limit that is reached.
+    StopFile {
+        /// Estimated relative error.
+        error: Option<f64> = optional(real("relative error (0.02 is 2 %)").above(0.0).at_most(1.0)),
+        /// Seconds of rendering.
+        seconds: Option<f64> = optional(real("seconds").above(0.0).at_most(1e9)),
+        /// Number of rounds.
+        rounds: Option<u32> = optional(count("number of rounds", 1, u32::MAX)),
+    }
+}
+
+struct Version;
+
+impl Decode for Version {
+    type Out = ();
+
+    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<()> {
+        match &node.value {
+            Value::Number(written) if *written == VERSION => Some(()),
+            Value::Number(written) => {
+                let message =
+                    format!("this program reads version {VERSION} of the format, not {written:.20}");
+                cx.issue(IssueCode::UnsupportedVersion, message);
+                None
+            }
+            _ => {
+                cx.wrong_type(&format!("the version of the format, {VERSION}"), node);
+                None
+            }
+        }
+    }
+}
+
+struct Albedo;
+
+impl Decode for Albedo {
+    type Out = AlbedoFile;
+
+    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<AlbedoFile> {
+        match node.value {
+            Value::Object(_) => {
+                object::<PatternFile>().decode(node, cx).map(|p| AlbedoFile::Checker(p.checker))
+            }
+            _ => color("albedo").fraction().decode(node, cx).map(AlbedoFile::Color),
+        }
+    }
+}
