@@ -1,12 +1,11 @@
 //! The joint to the renderer: the only file that names the `nephroid` crate.
 
 use crate::samples;
-use crate::standin as nephroid;
-use nephroid::image_io::{encode_exr, encode_png};
+use crate::standin::image_io::{encode_exr, encode_png};
+use crate::standin::report;
 use nephroid::light_path::PathClass;
 use nephroid::plan::Plan;
 use nephroid::render::{Render, RenderError};
-use nephroid::report;
 use nephroid::scene::assets::{AssetError, AssetSource};
 use nephroid::scene::{ImageSettings, Scene, SceneIssue};
 use serde_json::Value;
@@ -93,7 +92,7 @@ impl PlannedScene {
     /// Every decision with its reason, as JSON.
     #[must_use]
     pub fn report(&self) -> Value {
-        report::plan_json(&self.plan)
+        report::plan_json(&self.scene, &self.plan)
     }
 
     /// Memory that the render will need.
@@ -143,7 +142,6 @@ pub struct Output {
 }
 
 /// A render between two rounds.
-#[derive(Debug)]
 pub struct RunningRender {
     render: Render,
     settings: ImageSettings,
@@ -206,7 +204,7 @@ impl RunningRender {
     /// What the render counted, as JSON.
     #[must_use]
     pub fn stats(&self) -> Value {
-        report::stats_json(&self.render.stats())
+        report::stats_json(&self.render)
     }
 
     /// The pictures of a finished render.

@@ -92,7 +92,7 @@ impl Problem {
         Self::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "not_json", "The body is not declared as JSON", detail)
     }
 
-    /// 422: the scene cannot be rendered, and these are all the reasons.
+    /// 422 (400 if it is not even JSON): the scene cannot be rendered, and these are all the reasons.
     #[must_use]
     pub fn bad_scene(issues: &[Issue]) -> Self {
         let detail = match issues {
@@ -100,8 +100,13 @@ impl Problem {
             several => format!("There are {} errors in the scene.", several.len()),
         };
         let errors: Vec<_> = issues.iter().map(issue_json).collect();
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "scene_invalid", "The scene cannot be rendered", detail)
-            .with("errors", errors)
+        let problem = if issues.iter().any(|issue| issue.code == "syntax") {
+            Self::new(StatusCode::BAD_REQUEST, "json_invalid", "The body is not JSON", detail)
+        } else {
+            let title = "The scene cannot be rendered";
+            Self::new(StatusCode::UNPROCESSABLE_ENTITY, "scene_invalid", title, detail)
+        };
+        problem.with("errors", errors)
     }
 
     /// 422: the scene asks for more than one job may have.

@@ -28,7 +28,6 @@ pub(super) enum Turn {
 }
 
 /// One attempt at one job.
-#[derive(Debug)]
 pub(super) struct Attempt {
     pub(super) id: JobId,
     pub(super) fence: u32,
