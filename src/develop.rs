@@ -33,10 +33,9 @@ fn to_byte(x: f64) -> u8 {
     (x * 255.0).round() as u8
 }
 
-/// The linear value of an sRGB byte.
+/// The inverse of the sRGB curve, 0..1 to 0..1.
 #[must_use]
-pub fn srgb_to_linear(byte: u8) -> f64 {
-    let x = f64::from(byte) / 255.0;
+pub fn srgb_to_linear(x: f64) -> f64 {
     if x <= 0.040_45 { x / 12.92 } else { libm::pow((x + 0.055) / 1.055, 2.4) }
 }
 
@@ -65,7 +64,7 @@ mod tests {
     #[test]
     fn every_byte_survives_the_way_to_linear_and_back() {
         for byte in 0..=255 {
-            assert_eq!(shown(srgb_to_linear(byte) as f32, 0.0, Tone::Linear), byte);
+            assert_eq!(shown(srgb_to_linear(f64::from(byte) / 255.0) as f32, 0.0, Tone::Linear), byte);
         }
     }
 

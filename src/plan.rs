@@ -4,6 +4,7 @@ use crate::film::Film;
 use crate::light_path::Bounce;
 use crate::pass1_light::{self, Block, Budget, Source, Tally, Window};
 use crate::photon_map;
+use crate::radius::RadiusRule;
 use crate::render::Control;
 use crate::sampling::hash;
 use crate::scene::{Light, Material, Paths, Scene};
@@ -16,8 +17,8 @@ pub struct Plan {
     pub photons: Vec<Budget>,
     /// Eye samples per pixel, half and round.
     pub eye_samples: u32,
-    /// Radius of the density estimate in pixels at the receiver.
-    pub kernel_pixels: f32,
+    /// Radius of the density estimate.
+    pub radius: RadiusRule,
     /// Each choice with its reason.
     pub decisions: Vec<Decision>,
     /// What the user should know.
@@ -57,9 +58,6 @@ const LEAST_LOG2: u32 = 8;
 /// Most photons per half and round in all: bounds the memory of a round.
 const MOST_LOG2: u32 = 21;
 
-/// The kernel's radius: about a pixel, so that the estimate blurs no more than the pixel itself does.
-const KERNEL_PIXELS: f32 = 1.5;
-
 /// A window and what its pilot found.
 struct Pilot {
     window: Window,
@@ -75,7 +73,7 @@ impl Plan {
         let mut plan = Self {
             photons: Vec::new(),
             eye_samples: 1,
-            kernel_pixels: KERNEL_PIXELS,
+            radius: scene.render.radius,
             decisions: Vec::new(),
             warnings: Vec::new(),
             memory_bytes: 0,

@@ -7,6 +7,7 @@ use crate::pass1_light::{self, Tally};
 use crate::pass2_eye::{self, EyeContext, EyeCounts};
 use crate::plan::Plan;
 use crate::scene::Scene;
+use cpu_time::ProcessTime;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Instant;
@@ -91,8 +92,6 @@ pub enum StopReason {
     Seconds,
     /// All rounds asked for are done.
     Rounds,
-    /// The picture has no noise to remove: nothing in it is sampled.
-    Exact,
 }
 
 impl StopReason {
@@ -103,7 +102,6 @@ impl StopReason {
             Self::Error => "error",
             Self::Seconds => "seconds",
             Self::Rounds => "rounds",
-            Self::Exact => "exact",
         }
     }
 }
@@ -119,13 +117,32 @@ pub struct RoundReport {
     pub seconds: f64,
 }
 
-/// Seconds of wall-clock time per part of the method.
+/// Time of one pass, summed over rounds, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Seconds {
-    /// Photons and their tree.
-    pub pass1: f64,
-    /// Eye rays.
-    pub pass2: f64,
+pub struct PassTime {
+    /// By the clock.
+    pub wall: f64,
+    /// User and system time of the process meanwhile, over all its threads.
+    pub cpu: f64,
+}
+
+impl PassTime {
+    fn add(&mut self, since: &Stopwatch) {
+        self.wall += since.wall.elapsed().as_secs_f64();
+        self.cpu += since.cpu.elapsed().as_secs_f64();
+    }
+}
+
+/// Both clocks at one moment.
+struct Stopwatch {
+    wall: Instant,
+    cpu: ProcessTime,
+}
+
+impl Stopwatch {
+    fn start() -> Self {
+        Self { wall: Instant::now(), cpu: ProcessTime::now() }
+    }
 }
 
 /// What a render did.
@@ -137,8 +154,10 @@ pub struct RenderStats {
     pub stop_reason: Option<StopReason>,
     /// Estimated relative error.
     pub error: Option<f32>,
-    /// Time per pass, summed over rounds.
-    pub seconds: Seconds,
+    /// Time of pass 1, photons and their tree.
+    pub pass1: PassTime,
+    /// Time of pass 2, eye rays and look-ups.
+    pub pass2: PassTime,
     /// Photons and their energy (summed over rounds and halves), for each window of the plan.
     pub windows: Vec<Tally>,
     /// Rays of pass 2.
@@ -151,7 +170,8 @@ pub struct Render {
     scene: Arc<Scene>,
     plan: Plan,
     film: Film,
-    seconds: Seconds,
+    pass1: PassTime,
+    pass2: PassTime,
     windows: Vec<Tally>,
     eye: EyeCounts,
 }
@@ -168,7 +188,8 @@ impl Render {
     pub fn new(scene: Arc<Scene>, plan: Plan) -> Self {
         let film = Film::new(scene.image.width, scene.image.height);
         let windows = vec![Tally::default(); plan.photons.len()];
-        Self { scene, plan, film, seconds: Seconds::default(), windows, eye: EyeCounts::default() }
+        let time = PassTime::default();
+        Self { scene, plan, film, pass1: time, pass2: time, windows, eye: EyeCounts::default() }
     }
 
     /// Renders the next round, in the rayon pool this is called in.
@@ -178,13 +199,15 @@ impl Render {
     pub fn run_round(&mut self, control: &Control) -> Result<RoundReport, RenderError> {
         control.start_round();
         let round = self.film.rounds();
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let photons = if self.plan.photons.is_empty() {
             None
         } else {
             Some(pass1_light::emit_photons(&self.scene, &self.plan.photons, round, control)?)
         };
-        let pass1 = start.elapsed().as_secs_f64();
+        let mut pass1 = self.pass1;
+        pass1.add(&start);
+        let start = Stopwatch::start();
         let context = EyeContext { scene: &self.scene, plan: &self.plan, photons: photons.as_ref(), round };
         let (film, eye) = pass2_eye::trace_image(&context, control)?;
         self.film.add_round(&film);
@@ -192,8 +215,8 @@ impl Render {
         for (sum, tally) in self.windows.iter_mut().zip(photons.iter().flat_map(|p| &p.tallies)) {
             sum.add(tally);
         }
-        self.seconds.pass1 += pass1;
-        self.seconds.pass2 += start.elapsed().as_secs_f64() - pass1;
+        self.pass1 = pass1;
+        self.pass2.add(&start);
         Ok(RoundReport { rounds: self.rounds(), error: self.error_estimate(), seconds: self.seconds() })
     }
 
@@ -246,7 +269,7 @@ impl Render {
     /// Seconds spent in [`Render::run_round`].
     #[must_use]
     pub fn seconds(&self) -> f64 {
-        self.seconds.pass1 + self.seconds.pass2
+        self.pass1.wall + self.pass2.wall
     }
 
     /// The picture so far.
@@ -280,7 +303,8 @@ impl Render {
             rounds: self.rounds(),
             stop_reason: self.stop_reason(),
             error: self.error_estimate(),
-            seconds: self.seconds,
+            pass1: self.pass1,
+            pass2: self.pass2,
             windows: self.windows.clone(),
             eye: self.eye,
         }

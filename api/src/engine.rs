@@ -1,11 +1,11 @@
 //! The joint to the renderer: the only file that names the `nephroid` crate.
 
 use crate::samples;
-use crate::standin::image_io::{encode_exr, encode_png};
-use crate::standin::report;
+use nephroid::image_io::{encode_exr, encode_png};
 use nephroid::light_path::PathClass;
 use nephroid::plan::Plan;
 use nephroid::render::{Render, RenderError};
+use nephroid::report;
 use nephroid::scene::assets::{AssetError, AssetSource};
 use nephroid::scene::{ImageSettings, Scene, SceneIssue};
 use serde_json::Value;

@@ -14,7 +14,6 @@ mod planner;
 pub mod problem;
 pub mod routes;
 pub mod samples;
-mod standin;
 pub mod wire;
 
 pub use routes::router;

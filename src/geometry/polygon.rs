@@ -33,45 +33,28 @@ pub(super) struct Edge {
     to: DVec2,
 }
 
-/// What is wrong with a polygon. `outline` is 0 for the outer one, then counts the holes.
+/// What is wrong with a polygon.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PolygonError {
-    /// No area, so no normal: fewer than three corners, all on a line, or crossing so that parts cancel.
-    #[error("no area: at least three vertices that are not on a line are needed")]
-    NoArea {
-        /// Which outline.
-        outline: usize,
-    },
+    /// Fewer than three corners.
+    #[error("an outline needs at least 3 vertices, not {0}")]
+    TooFewVertices(usize),
+    /// No area, so no normal.
+    #[error("the polygon has no area")]
+    NoArea,
     /// The corners do not lie in a plane.
-    #[error(
-        "not planar: a vertex is {distance:.1e} m off the polygon's plane, {tolerance:.1e} m are allowed"
-    )]
+    #[error("vertex {vertex} is {distance:.3e} away from the plane of the polygon")]
     NotPlanar {
-        /// Which outline.
-        outline: usize,
-        /// Distance of the worst corner from the plane.
+        /// Index of the worst corner, counted through all outlines.
+        vertex: usize,
+        /// Its distance from the plane.
         distance: f64,
-        /// What is allowed.
-        tolerance: f64,
     },
 }
 
-impl PolygonError {
-    /// Which outline is wrong: 0 for the outer one, then the holes.
-    #[must_use]
-    pub fn outline(&self) -> usize {
-        match *self {
-            Self::NoArea { outline } | Self::NotPlanar { outline, .. } => outline,
-        }
-    }
-}
-
-/// How far a corner may lie off the plane, as a fraction of the polygon's size: corners given with five
-/// digits.
-const PLANARITY: f64 = 1e-4;
-
-/// Least area of an outline as a fraction of its squared size: below it f32 does not tell its sides apart.
-const LEAST_AREA: f64 = 1e-7;
+/// How far a corner may lie off the plane, as a fraction of the polygon's size: the rounding of corners
+/// given in f32 or with seven decimal digits, with room to spare.
+const PLANARITY: f64 = 1e-5;
 
 impl Polygon {
     /// Makes a polygon of an outline and the outlines of its holes, and appends its edges to `edges`.
@@ -222,23 +205,31 @@ struct Plane {
 }
 
 impl Plane {
+    /// Newell's normal of the outline.
     fn of(outlines: &[Vec<Vec3>]) -> Result<Self, PolygonError> {
-        for (outline, corners) in outlines.iter().enumerate() {
-            let size = extent(corners);
-            let area = 0.5 * doubled_area(corners).length();
-            if area.is_nan() || area <= LEAST_AREA * size * size {
-                return Err(PolygonError::NoArea { outline });
-            }
+        let outline = outlines.first().ok_or(PolygonError::TooFewVertices(0))?;
+        if let Some(short) = outlines.iter().find(|o| o.len() < 3) {
+            return Err(PolygonError::TooFewVertices(short.len()));
         }
-        let corners = outlines.first().ok_or(PolygonError::NoArea { outline: 0 })?;
-        let normal = doubled_area(corners).normalize();
-        let count = corners.len() as f64;
-        let offset = corners.iter().map(|p| normal.dot(p.as_dvec3())).sum::<f64>() / count;
-        let tolerance = PLANARITY * extent(corners);
-        for (outline, corners) in outlines.iter().enumerate() {
-            let off = corners.iter().map(|p| (normal.dot(p.as_dvec3()) - offset).abs()).fold(0.0, f64::max);
-            if off > tolerance {
-                return Err(PolygonError::NotPlanar { outline, distance: off, tolerance });
+        let base = outline[0].as_dvec3();
+        let doubled_area: DVec3 = (1..outline.len() - 1)
+            .map(|i| (outline[i].as_dvec3() - base).cross(outline[i + 1].as_dvec3() - base))
+            .sum();
+        let size = outline.iter().map(|p| (p.as_dvec3() - base).length()).fold(0.0, f64::max);
+        // Less area than the rounding of the corners can make.
+        if doubled_area.length() <= size * size * 1e-9 || !doubled_area.is_finite() {
+            return Err(PolygonError::NoArea);
+        }
+        let normal = doubled_area.normalize();
+        let count = outline.len() as f64;
+        let offset = outline.iter().map(|p| normal.dot(p.as_dvec3())).sum::<f64>() / count;
+        // Corners far from the origin are rounded more coarsely.
+        let farthest = outline.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max);
+        let tolerance = PLANARITY * size + 2.0 * f64::from(f32::EPSILON * farthest);
+        for (vertex, p) in outlines.iter().flatten().enumerate() {
+            let distance = (normal.dot(p.as_dvec3()) - offset).abs();
+            if distance > tolerance {
+                return Err(PolygonError::NotPlanar { vertex, distance });
             }
         }
         let size = normal.abs();
@@ -255,17 +246,4 @@ impl Plane {
     fn project(&self, p: Vec3) -> DVec2 {
         DVec2::new(f64::from(p[self.axes[0]]), f64::from(p[self.axes[1]]))
     }
-}
-
-/// Newell's normal: its length is twice the area of the outline.
-fn doubled_area(corners: &[Vec3]) -> DVec3 {
-    let Some(base) = corners.first().map(|p| p.as_dvec3()) else { return DVec3::ZERO };
-    let spokes = || corners.iter().skip(1).map(|p| p.as_dvec3() - base);
-    spokes().zip(spokes().skip(1)).map(|(a, b)| a.cross(b)).sum()
-}
-
-/// Largest distance of a corner from the first.
-fn extent(corners: &[Vec3]) -> f64 {
-    let Some(base) = corners.first().map(|p| p.as_dvec3()) else { return 0.0 };
-    corners.iter().map(|p| p.as_dvec3().distance(base)).fold(0.0, f64::max)
 }

@@ -90,15 +90,21 @@ fn window_seed(seed: u64, window: usize, half: u32) -> u64 {
 
 /// A run of consecutive points of one scrambled sequence.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Block {
-    pub(crate) first: u32,
-    pub(crate) count: u32,
-    pub(crate) seed: u64,
+pub struct Block {
+    /// Index of the first point.
+    pub first: u32,
+    /// Number of points, at least 1; the block as a whole carries the window's flux.
+    pub count: u32,
+    /// Seed that scrambles the sequence.
+    pub seed: u64,
 }
 
 /// Traces a block of photons through one window; the result is in the order of the points, whatever the
 /// number of threads.
-pub(crate) fn trace_block(
+///
+/// # Errors
+/// [`RenderError::Cancelled`] if the control says so.
+pub fn trace_block(
     scene: &Scene,
     window: &Window,
     block: Block,

@@ -54,7 +54,8 @@ impl EyeCounts {
 /// Follows eye rays; owns the stack of branches yet to follow.
 pub(super) struct EyeWalk<'a> {
     context: &'a EyeContext<'a>,
-    spread: f32,
+    /// Radius of the density estimate per metre of the eye ray's way.
+    kernel_spread: f32,
     stack: Vec<Branch>,
     /// The eye sample that is being followed.
     half: usize,
@@ -76,9 +77,10 @@ struct Branch {
 
 impl<'a> EyeWalk<'a> {
     pub(super) fn new(context: &'a EyeContext<'a>) -> Self {
-        let spread = context.scene.camera.pixel_spread();
+        let pixels = context.plan.radius.pixels(context.round) as f32;
+        let kernel_spread = context.scene.camera.pixel_spread() * pixels;
         let sample = SamplePoint::new(0, 0);
-        Self { context, spread, stack: Vec::new(), half: 0, sample, counts: EyeCounts::default() }
+        Self { context, kernel_spread, stack: Vec::new(), half: 0, sample, counts: EyeCounts::default() }
     }
 
     /// Adds what arrives along one eye ray to the classes' sums.
@@ -182,7 +184,7 @@ impl<'a> EyeWalk<'a> {
         let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
         sums.add(PathClass::Direct, weight * direct);
         if let Some(photons) = self.context.photons {
-            let radius = self.kernel_radius(branch, hit);
+            let radius = (branch.travelled + hit.t) * self.kernel_spread;
             let lookup = Lookup { point: hit.surface.point, normal, sheet: hit.sheet, radius };
             self.counts.lookups += 1;
             let caustic = photons.maps[self.half].irradiance(&lookup).value;
@@ -191,11 +193,5 @@ impl<'a> EyeWalk<'a> {
                 sums.add(PathClass::Caustic, weight * caustic / mass);
             }
         }
-    }
-
-    /// The density estimate's radius: in proportion to the pixel's own width on the surface.
-    fn kernel_radius(&self, branch: &Branch, hit: &Hit) -> f32 {
-        let pixel = (branch.travelled + hit.t) * self.spread;
-        pixel * self.context.plan.kernel_pixels
     }
 }

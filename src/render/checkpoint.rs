@@ -1,6 +1,6 @@
 //! A render in progress as bytes: it continues to the same picture as if it had never stopped.
 
-use super::{Render, Seconds};
+use super::{PassTime, Render};
 use crate::film::Film;
 use crate::pass1_light::Tally;
 use crate::pass2_eye::EyeCounts;
@@ -28,8 +28,10 @@ impl Render {
     #[must_use]
     pub fn checkpoint(&self) -> Vec<u8> {
         let mut out = MAGIC.to_vec();
-        put_f64(&mut out, self.seconds.pass1);
-        put_f64(&mut out, self.seconds.pass2);
+        for time in [self.pass1, self.pass2] {
+            put_f64(&mut out, time.wall);
+            put_f64(&mut out, time.cpu);
+        }
         let EyeCounts { eye_rays, shadow_rays, lookups, cut } = self.eye;
         for count in [eye_rays, shadow_rays, lookups, cut, self.windows.len() as u64] {
             put_u64(&mut out, count);
@@ -54,7 +56,9 @@ impl Render {
 
     fn read(&mut self, bytes: &[u8]) -> Option<()> {
         let mut bytes = bytes;
-        self.seconds = Seconds { pass1: take_f64(&mut bytes)?, pass2: take_f64(&mut bytes)? };
+        for time in [&mut self.pass1, &mut self.pass2] {
+            *time = PassTime { wall: take_f64(&mut bytes)?, cpu: take_f64(&mut bytes)? };
+        }
         self.eye = EyeCounts {
             eye_rays: take_u64(&mut bytes)?,
             shadow_rays: take_u64(&mut bytes)?,

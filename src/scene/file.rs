@@ -10,10 +10,11 @@ use super::read::{
     uv,
 };
 use super::{Paths, Tone};
+use crate::radius::RadiusRule;
 use std::collections::BTreeSet;
 
 /// The version of the format that is read.
-const VERSION: &str = "1";
+const VERSION: f64 = 1.0;
 /// Most pixels across or down.
 const MAX_IMAGE_SIDE: u32 = 16_384;
 
@@ -276,6 +277,8 @@ record! {
         paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
         /// When the render ends.
         stop: Option<StopFile> = optional(object::<StopFile>()),
+        /// Radius of the caustics' density estimate: a pixel, or shrinking from round to round.
+        radius: RadiusRule = or(choice(RadiusRule::NAMED.to_vec()), RadiusRule::Pixel),
         /// Seed of every random stream.
         seed: u64 = or(seed(), 0),
     }
@@ -300,7 +303,7 @@ impl Decode for Version {
 
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<()> {
         match &node.value {
-            Value::Number(written) if *written == VERSION => Some(()),
+            Value::Number(written) if written.parse() == Ok(VERSION) => Some(()),
             Value::Number(written) => {
                 let message =
                     format!("this program reads version {VERSION} of the format, not {written:.20}");

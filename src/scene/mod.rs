@@ -21,6 +21,7 @@ pub use light::{Light, QuadLight};
 pub use material::{Material, Texture};
 
 use crate::geometry::Geometry;
+use crate::radius::RadiusRule;
 use glam::{Vec2, Vec3};
 
 macro_rules! typed_id {
@@ -145,6 +146,8 @@ pub struct RenderSettings {
     pub paths: Paths,
     /// When the render ends; the first limit reached ends it.
     pub stop: Stop,
+    /// Radius of the caustics' density estimate.
+    pub radius: RadiusRule,
     /// Seed of every random stream.
     pub seed: u64,
 }

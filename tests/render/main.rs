@@ -1,3 +1,11 @@
 //! One binary for all tests of the renderer.
 
+mod caustics;
+mod determinism;
+mod direct_light;
+mod geometry;
+mod optics;
+mod photon_map;
+mod plan;
 mod scene_file;
+mod support;

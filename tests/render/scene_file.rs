@@ -1,8 +1,8 @@
 //! The scene file: what is read, and that every error is found, named and placed.
 
 use nephroid::scene::{
-    AssetError, AssetSource, IssueCode, Light, Material, NoAssets, Paths, Scene, SceneErrors, Stop, Texture,
-    Tone,
+    AssetError, AssetSource, DirectoryAssets, IssueCode, Light, Material, NoAssets, Paths, Scene,
+    SceneErrors, Stop, Texture, Tone,
 };
 use std::borrow::Cow;
 
@@ -153,12 +153,11 @@ const BAD_SCENES: &[(&str, &str, &str, IssueCode)] = &[
     (r#""up": [0, 1, 0]"#, r#""up": [0, 2.2, 4.2]"#, "/camera/up", C::Degenerate),
     (r#""up": [0, 1, 0]"#, r#""up": [0, 0, 0]"#, "/camera/up", C::Degenerate),
     // Shapes.
-    ("[3, 0, -3], [-3, 0, -3]", "[3, 1e-2, -3], [-3, 0, -3]", "/objects/0/vertices", C::NotPlanar),
+    ("[3, 0, -3], [-3, 0, -3]", "[3, 1e-2, -3], [-3, 0, -3]", "/objects/0/vertices/0", C::NotPlanar),
     ("[3, 0, 3], [3, 0, -3], [-3, 0, -3]", "[3, 0, 3]", "/objects/0/vertices", C::WrongLength),
     ("[3, 0, 3], [3, 0, -3], [-3, 0, -3]", "[3, 0, 3], [0, 0, 3]", "/objects/0/vertices", C::Degenerate),
     ("[3, 0, 3], [3, 0, -3], [-3, 0, -3]", "[3, 0, -3], [3, 0, 3], [-3, 0, -3]", "/objects/0/vertices", C::Degenerate),
-    ("[0, 0, -1]", "[0, 0.5, -1]", "/objects/0/holes/0", C::NotPlanar),
-    ("[0, 0, -1]", "[0, 0, 1]", "/objects/0/holes/0", C::Degenerate),
+    ("[0, 0, -1]", "[0, 0.5, -1]", "/objects/0/holes/0/2", C::NotPlanar),
     ("[0, 1, 2]", "[0, 1, 3]", "/objects/2/triangles/0/2", C::IndexOutOfRange),
     ("[0, 1, 2]", "[0, 1, -1]", "/objects/2/triangles/0/2", C::OutOfRange),
     ("[[0, 1, 2]]", "[]", "/objects/2/triangles", C::WrongLength),
@@ -166,6 +165,7 @@ const BAD_SCENES: &[(&str, &str, &str, IssueCode)] = &[
     ("[0, 0, 2], ", "", "/objects/2/normals", C::WrongLength),
     ("[0, 0, 2], ", "[0, 0, 0], ", "/objects/2/normals/0", C::Degenerate),
     (r#""triangles": ["#, r#""asset": "a.ply", "triangles": ["#, "/objects/2/asset", C::AssetUnavailable),
+    ("[0, 0, -1]", "[0, 0, 1]", "/objects/0/holes/0", C::Degenerate),
     // Lights.
     ("[0.2, 0.4]", "[0.2, 0]", "/lights/0/size/1", C::OutOfRange),
     (r#""towards": [0, 0, 0]"#, r#""towards": [0, 3, 0]"#, "/lights/0/towards", C::Degenerate),
@@ -201,7 +201,7 @@ fn all_errors_are_reported_at_once_in_the_order_of_the_text() {
         ("/camera/zoom", IssueCode::UnknownField),
         ("/materials/glass/ior", IssueCode::MissingField),
         ("/materials/glass/iro", IssueCode::UnknownField),
-        ("/objects/0/vertices", IssueCode::NotPlanar),
+        ("/objects/0/vertices/0", IssueCode::NotPlanar),
         ("/objects/1/radius", IssueCode::WrongType),
         ("/objects/2/material", IssueCode::UnknownReference),
         ("/lights/0/edge", IssueCode::Degenerate),
@@ -243,6 +243,27 @@ fn a_wrong_byte_anywhere_causes_no_panic() {
             let text = format!("{}{byte}{}", &BASE[..at], &BASE[at + 1..]);
             if let Err(errors) = Scene::from_json(&text, &NoAssets) {
                 assert!(!errors.issues.is_empty(), "{text}");
+            }
+        }
+    }
+}
+
+#[test]
+fn extreme_numbers_anywhere_cause_no_panic() {
+    let is_number = |c: char| c.is_ascii_digit() || ['.', '-'].contains(&c);
+    let starts: Vec<usize> = BASE
+        .char_indices()
+        .filter(|(at, c)| is_number(*c) && !BASE[..*at].ends_with(is_number))
+        .map(|(at, _)| at)
+        .collect();
+    assert!(starts.len() > 100, "the numbers of the base scene are found");
+    for at in starts {
+        let rest = BASE[at..].trim_start_matches(is_number);
+        for number in ["0", "-0.0", "1e-9", "1e9", "-1e9", "1e-300", "1e38", "1e308", "4294967295"] {
+            let text = format!("{}{number}{rest}", &BASE[..at]);
+            match Scene::from_json(&text, &NoAssets) {
+                Ok(scene) => assert!(scene.camera.forward.is_finite(), "{text}"),
+                Err(errors) => assert!(!errors.issues.is_empty(), "{text}"),
             }
         }
     }
@@ -315,4 +336,51 @@ fn bad_assets_are_errors_at_the_field_that_names_them() {
     }
     let errors = errors(WITH_ASSET);
     assert_eq!(places(&errors)[0], ("/objects/0/asset", IssueCode::AssetUnavailable));
+}
+
+fn sample_scenes() -> Vec<(String, String)> {
+    let mut scenes: Vec<(String, String)> = std::fs::read_dir("scenes")
+        .expect("the samples are in scenes/")
+        .map(|entry| entry.expect("a readable folder").path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "json"))
+        .map(|path| (path.display().to_string(), std::fs::read_to_string(&path).expect("a text")))
+        .collect();
+    scenes.sort();
+    scenes
+}
+
+#[test]
+fn every_sample_scene_loads() {
+    let scenes = sample_scenes();
+    assert!(scenes.len() >= 5, "{scenes:?}");
+    for (path, text) in scenes {
+        let scene = Scene::from_json(&text, &DirectoryAssets::new("scenes"));
+        let scene = scene.unwrap_or_else(|errors| panic!("{path}:\n{errors}"));
+        assert!(!scene.name.is_empty() && scene.geometry.primitive_count() > 2, "{path}");
+    }
+}
+
+#[test]
+fn every_truncation_of_a_sample_scene_is_an_error_and_no_panic() {
+    for (path, text) in sample_scenes() {
+        let text = text.trim_end();
+        for end in (0..text.len()).filter(|end| text.is_char_boundary(*end)) {
+            assert!(Scene::from_json(&text[..end], &NoAssets).is_err(), "{path} cut at {end}");
+        }
+    }
+}
+
+#[test]
+fn every_truncation_of_a_sample_mesh_is_an_error_and_no_panic() {
+    let packed = std::fs::read("scenes/meshes/ring.ply.gz").unwrap();
+    let mut plain = Vec::new();
+    std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&packed[..]), &mut plain).unwrap();
+    // The whole file is read, so that the truncations fail for no other reason.
+    Scene::from_json(WITH_ASSET, &OneAsset(plain.clone())).unwrap();
+    for whole in [plain, packed] {
+        for end in 0..whole.len() {
+            let errors = Scene::from_json(WITH_ASSET, &OneAsset(whole[..end].to_vec())).unwrap_err();
+            assert_eq!(places(&errors)[0], ("/objects/0/asset", IssueCode::AssetInvalid), "cut at {end}");
+        }
+    }
 }

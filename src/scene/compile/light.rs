@@ -30,7 +30,8 @@ impl Compiler<'_> {
                     let name = format!("lights/{index}");
                     let object = self.add_object(Object { name, material, emitter: Some(id) });
                     if let Err(error) = self.geometry.polygon(object, &[quad.corners().to_vec()]) {
-                        self.issues.add(format!("/lights/{index}"), IssueCode::Degenerate, error.to_string());
+                        let message = format!("too small for its distance from the origin: {error}");
+                        self.issues.add(format!("/lights/{index}/size"), IssueCode::Degenerate, message);
                     }
                     self.lights.push(Light::Quad(quad));
                 }

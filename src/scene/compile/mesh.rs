@@ -11,8 +11,8 @@ use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Most triangles of a scene, over all objects.
-const MAX_TRIANGLES: usize = 1 << 26;
+/// Most triangles of a scene, over all objects: an asset may be used many times, and each use takes memory.
+const MAX_TRIANGLES: usize = 1 << 24;
 
 /// Loads meshes; each asset once, however many objects use it.
 pub(super) struct MeshLoader<'a> {

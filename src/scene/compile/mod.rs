@@ -3,6 +3,7 @@
 
 mod light;
 mod mesh;
+mod polygon;
 
 use super::assets::AssetSource;
 use super::file::{
@@ -15,7 +16,7 @@ use super::{
     Camera, ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop,
     Texture, Tone,
 };
-use crate::geometry::{GeometryBuilder, PolygonError};
+use crate::geometry::GeometryBuilder;
 use glam::{DVec3, Vec2, Vec3};
 use mesh::MeshLoader;
 use std::collections::HashMap;
@@ -169,13 +170,7 @@ impl<'f> Compiler<'f> {
                 self.geometry.sphere(object, vec3(sphere.center), sphere.radius as f32)
             }
             ShapeFile::Polygon(polygon) => {
-                let outlines: Vec<Vec<Vec3>> = std::iter::once(&polygon.vertices)
-                    .chain(&polygon.holes)
-                    .map(|outline| outline.iter().map(|v| vec3(*v)).collect())
-                    .collect();
-                if let Err(error) = self.geometry.polygon(object, &outlines) {
-                    self.bad_polygon(&error, pointer);
-                }
+                polygon::add(polygon, object, &mut self.geometry, pointer, self.issues);
             }
             ShapeFile::Mesh(mesh) => {
                 if let Some(mesh) = self.meshes.load(mesh, pointer, self.issues) {
@@ -183,18 +178,6 @@ impl<'f> Compiler<'f> {
                 }
             }
         }
-    }
-
-    fn bad_polygon(&mut self, error: &PolygonError, pointer: &str) {
-        let pointer = match error.outline() {
-            0 => format!("{pointer}/vertices"),
-            hole => format!("{pointer}/holes/{}", hole - 1),
-        };
-        let code = match error {
-            PolygonError::NoArea { .. } => IssueCode::Degenerate,
-            PolygonError::NotPlanar { .. } => IssueCode::NotPlanar,
-        };
-        self.issues.add(pointer, code, error.to_string());
     }
 
     fn render(&mut self, render: &RenderFile) -> Option<RenderSettings> {
@@ -209,7 +192,7 @@ impl<'f> Compiler<'f> {
                 Stop { error: error.map(|e| e as f32), seconds: *seconds, rounds: *rounds }
             }
         };
-        Some(RenderSettings { paths: render.paths, stop, seed: render.seed })
+        Some(RenderSettings { paths: render.paths, stop, radius: render.radius, seed: render.seed })
     }
 }
 

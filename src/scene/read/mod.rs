@@ -122,14 +122,22 @@ impl<'c, 'm, 'n> Fields<'c, 'm, 'n> {
     }
 
     /// Notes that a field is missing.
-    pub(super) fn missing(&mut self, name: &'static str) {
+    pub(super) fn missing(&mut self, name: &'static str, expected: &str) {
         let pointer = pointer_step(&self.cx.pointer(), name);
-        self.cx.issues.add(pointer, IssueCode::MissingField, format!("the field `{name}` is missing"));
+        let message = format!("the field `{name}` is missing{expected}");
+        self.cx.issues.add(pointer, IssueCode::MissingField, message);
     }
 
     /// Reads the field that says which of several records this is.
     pub(super) fn tag(&mut self, name: &'static str, tags: &'static [&'static str]) -> Option<&'static str> {
-        let tag = required(choice(tags.iter().map(|tag| (*tag, *tag)).collect())).take(name, self);
+        let decoder = choice(tags.iter().map(|tag| (*tag, *tag)).collect());
+        let tag = match self.decode(name, &decoder) {
+            Some(tag) => tag,
+            None => {
+                self.missing(name, &format!("; expected one of `{}`", tags.join("`, `")));
+                None
+            }
+        };
         // Which fields belong here is not known without the tag.
         self.complete &= tag.is_some();
         tag

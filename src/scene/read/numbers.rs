@@ -3,6 +3,7 @@
 use super::super::issue::IssueCode;
 use super::super::json::{Node, Value};
 use super::{Context, Decode, Step, quoted};
+use crate::develop::srgb_to_linear;
 
 /// Largest coordinate or length, in metres: its fourth power is still a float.
 pub(in crate::scene) const MAX_LENGTH: f64 = 1e9;
@@ -295,7 +296,7 @@ fn hex_color(text: &str) -> Option<[f64; 3]> {
         text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
     let packed = u32::from_str_radix(digits, 16).ok()?;
     let [_, r, g, b] = packed.to_be_bytes();
-    Some([r, g, b].map(crate::develop::srgb_to_linear))
+    Some([r, g, b].map(|byte| srgb_to_linear(f64::from(byte) / 255.0)))
 }
 
 #[cfg(test)]

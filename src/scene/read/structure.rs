@@ -40,7 +40,7 @@ impl<D: Decode> Rule for Required<D> {
     fn take(&self, name: &'static str, fields: &mut Fields<'_, '_, '_>) -> Option<D::Out> {
         let value = fields.decode(name, &self.0);
         if value.is_none() {
-            fields.missing(name);
+            fields.missing(name, "");
         }
         value?
     }
