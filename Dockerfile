@@ -9,11 +9,7 @@
 
 FROM rust:1.95-bookworm AS build
 WORKDIR /src
-COPY Cargo.toml Cargo.lock rust-toolchain.toml ./
-COPY src src
-COPY api api
-COPY scenes scenes
-COPY tests tests
+COPY . .
 RUN cargo build --release --locked --workspace --bins
 
 FROM debian:bookworm-slim

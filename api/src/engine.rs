@@ -242,3 +242,45 @@ impl Picture {
         encode_png(&self.image, &self.settings).map_err(|error| error.to_string())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn begin(checkpoint: Option<&[u8]>) -> RunningRender {
+        let sample = samples::find("glass-ball").expect("it is embedded");
+        let mut scene: Value = serde_json::from_str(sample.text).expect("it is JSON");
+        scene["image"]["width"] = 32.into();
+        scene["image"]["height"] = 24.into();
+        let scene = LoadedScene::read(&scene.to_string(), 60.0).expect("it is a scene");
+        scene.plan().begin(checkpoint)
+    }
+
+    #[test]
+    fn a_checkpoint_goes_on_to_the_same_bytes() {
+        let control = Control::default();
+        let mut straight = begin(None);
+        (0..3).for_each(|_| straight.run_round(&control).expect("nothing stops it"));
+        let mut first = begin(None);
+        (0..2).for_each(|_| first.run_round(&control).expect("nothing stops it"));
+        let mut resumed = begin(Some(&first.checkpoint()));
+        assert_eq!(resumed.rounds(), 2, "finished rounds are not made again");
+        resumed.run_round(&control).expect("nothing stops it");
+        assert!(resumed.picture().to_png() == straight.picture().to_png());
+    }
+
+    #[test]
+    fn a_checkpoint_that_does_not_fit_is_not_used() {
+        assert_eq!(begin(Some(b"something else")).rounds(), 0);
+    }
+
+    #[test]
+    fn a_round_that_is_stopped_leaves_the_finished_ones() {
+        let mut render = begin(None);
+        render.run_round(&Control::default()).expect("nothing stops it");
+        let stop = Control::default();
+        stop.cancel();
+        assert_eq!(render.run_round(&stop), Err(RoundError::Cancelled));
+        assert_eq!(render.rounds(), 1);
+    }
+}

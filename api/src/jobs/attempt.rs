@@ -145,7 +145,7 @@ impl Attempt {
     fn conclude(&self, files: &Files) -> Result<Outcome, Failure> {
         let encoding = |detail| {
             tracing::error!(job = %self.id, detail, "a picture could not be encoded");
-            Failure { code: "internal".into(), detail: "The picture could not be encoded.".into() }
+            Failure::internal("The picture could not be encoded.")
         };
         let outputs = self.render.outputs().map_err(encoding)?;
         let save = |output: &crate::engine::Output| {
@@ -172,5 +172,5 @@ fn save_checkpoint(files: &Files, id: JobId, render: &RunningRender) {
 
 fn internal(what: &str, error: &std::io::Error) -> Failure {
     tracing::error!(what, %error, "a file of a job could not be used");
-    Failure { code: "internal".into(), detail: format!("The service could not use its {what} file.") }
+    Failure::internal(format!("The service could not use its {what} file."))
 }

@@ -126,6 +126,12 @@ pub struct Failure {
     pub detail: String,
 }
 
+impl Failure {
+    fn internal(detail: impl Into<String>) -> Self {
+        Self { code: "internal".into(), detail: detail.into() }
+    }
+}
+
 /// A job as the database knows it.
 #[derive(Clone, Debug)]
 pub struct Job {

@@ -9,6 +9,7 @@ use super::live::Registry;
 use super::sql::{self, Outcome};
 use super::store::{Store, StoreError};
 use super::{Event, Failure, JobId, service::now_ms};
+use serde_json::Value;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, mpsc};
@@ -16,6 +17,14 @@ use std::sync::{Arc, mpsc};
 /// Wakes the render thread: there is a new job, or it is time to stop.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wake;
+
+/// What became of the first write of an attempt.
+enum Recorded {
+    Wanted,
+    /// The job was cancelled or deleted while it was planned.
+    Unwanted,
+    Failed,
+}
 
 /// The render thread's own things.
 pub(super) struct Scheduler {
@@ -60,13 +69,16 @@ impl Scheduler {
         let live = self.registry.enter(id);
         self.registry.announce(id);
         let prepare = || self.pool.install(|| attempt::prepare(&self.files, id, self.limits));
-        let begun = guarded(prepare).and_then(|(planned, report)| {
-            self.store
-                .write_blocking(move |db| sql::record_plan(db, id, fence, &report))
-                .map_err(|error| store_failure(&error))?;
-            guarded(|| Attempt::begin((id, fence), planned, live, &self.files))
-        });
-        match begun {
+        let planned = match guarded(prepare) {
+            Ok((planned, report)) => match self.record_plan((id, fence), report) {
+                Recorded::Wanted => Ok(planned),
+                Recorded::Unwanted => return self.registry.leave(id),
+                Recorded::Failed => Err(Failure::internal("The service could not record the plan.")),
+            },
+            Err(failure) => Err(failure),
+        };
+        match planned.and_then(|planned| guarded(|| Attempt::begin((id, fence), planned, live, &self.files)))
+        {
             Ok(mut attempt) => {
                 let least = self.running.iter().map(|rival| rival.share).reduce(f64::min);
                 attempt.share = least.unwrap_or(0.0);
@@ -74,6 +86,17 @@ impl Scheduler {
                 tracing::info!(job = %id, attempt = fence, "started");
             }
             Err(failure) => self.conclude((id, fence), Err(failure)),
+        }
+    }
+
+    fn record_plan(&self, (id, fence): (JobId, u32), report: Value) -> Recorded {
+        match self.store.write_blocking(move |db| sql::record_plan(db, id, fence, &report)) {
+            Ok(()) => Recorded::Wanted,
+            Err(StoreError::StaleAttempt) => Recorded::Unwanted,
+            Err(error) => {
+                tracing::error!(job = %id, %error, "a plan could not be recorded");
+                Recorded::Failed
+            }
         }
     }
 
@@ -143,18 +166,13 @@ impl Scheduler {
 fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         tracing::error!(panic = panic_text(panic.as_ref()), "the renderer panicked");
-        Err(Failure { code: "internal".into(), detail: "The renderer failed; the log says how.".into() })
+        Err(Failure::internal("The renderer failed; the log says how."))
     })
 }
 
 fn panic_text(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("(no text)")
-}
-
-fn store_failure(error: &StoreError) -> Failure {
-    tracing::error!(%error, "a plan could not be recorded");
-    Failure { code: "internal".into(), detail: "The service could not record the plan.".into() }
 }
 
 #[cfg(test)]
