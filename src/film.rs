@@ -3,6 +3,7 @@
 use crate::geometry::SheetId;
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
+use crate::sampling::hash;
 use glam::Vec3;
 
 const CLASSES: usize = PathClass::ALL.len();
@@ -61,29 +62,31 @@ pub struct Guide {
     pub position: Vec3,
     /// Its normal there.
     pub normal: Vec3,
-    /// Its sheet, by [`Guide::sheet_code`]; 0 if no sample reached a surface.
-    pub sheet: u32,
+    /// Its sheet and the way there, by [`Guide::view_code`]; 0 if no sample reached a surface.
+    pub view: u32,
 }
 
 impl Guide {
-    /// Code of a pixel whose samples reached several sheets.
+    /// Code of a pixel whose samples differ in where or how they went.
     pub const MIXED: u32 = u32::MAX;
 
-    /// Code of a pixel whose samples all reached this sheet.
+    /// Code of a pixel whose samples all reached this sheet by these reflections and refractions. A wall seen
+    /// through water and the same wall above it are two views.
     #[must_use]
-    pub fn sheet_code(sheet: SheetId) -> u32 {
-        sheet.0 + 1
+    pub fn view_code(sheet: SheetId, way: u64) -> u32 {
+        let code = hash(u64::from(sheet.0), way) as u32;
+        code.clamp(1, Self::MIXED - 1)
     }
 
     /// Adds another sample's, or another round's.
     pub(crate) fn add(&mut self, other: &Self) {
-        if self.sheet == 0 {
+        if self.view == 0 {
             *self = *other;
             return;
         }
         self.gain += other.gain;
-        if other.sheet != 0 && other.sheet != self.sheet {
-            self.sheet = Self::MIXED;
+        if other.view != 0 && other.view != self.view {
+            self.view = Self::MIXED;
         }
     }
 }
@@ -263,7 +266,7 @@ impl PixelSums {
         vector(self.guide.normal);
         word(self.halves[0].arrivals.to_bits());
         word(self.halves[1].arrivals.to_bits());
-        word(self.guide.sheet);
+        word(self.guide.view);
     }
 
     /// The inverse of [`PixelSums::visit`].
@@ -278,6 +281,6 @@ impl PixelSums {
         self.guide.normal = vector();
         self.halves[0].arrivals = f32::from_bits(word());
         self.halves[1].arrivals = f32::from_bits(word());
-        self.guide.sheet = word();
+        self.guide.view = word();
     }
 }

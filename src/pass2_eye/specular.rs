@@ -208,8 +208,8 @@ impl<'a> EyeWalk<'a> {
                 half.irradiance += caustic;
                 half.arrivals += 1.0;
                 let surface = &hit.surface;
-                let sheet = Guide::sheet_code(hit.sheet);
-                sums.guide.add(&Guide { gain: weight, position: surface.point, normal, sheet });
+                let view = Guide::view_code(hit.sheet, branch.key);
+                sums.guide.add(&Guide { gain: weight, position: surface.point, normal, view });
             }
         }
     }

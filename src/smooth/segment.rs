@@ -71,13 +71,13 @@ pub(super) fn segments(film: &Film) -> Vec<Segment> {
 }
 
 fn is_surface(guide: &Guide) -> bool {
-    guide.sheet != 0 && guide.sheet != Guide::MIXED
+    guide.view != 0 && guide.view != Guide::MIXED
 }
 
-/// True if both pixels show the same smooth piece: same sheet, similar normals, and each in the other's
+/// True if both pixels show the same smooth piece: same view, similar normals, and each in the other's
 /// tangent plane up to the slope that those normals allow.
 fn joined(a: &Guide, b: &Guide) -> bool {
-    if a.sheet != b.sheet || a.normal.dot(b.normal) < SAME_FACE {
+    if a.view != b.view || a.normal.dot(b.normal) < SAME_FACE {
         return false;
     }
     let apart = b.position - a.position;
