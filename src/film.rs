@@ -34,22 +34,40 @@ impl ClassSums {
     }
 }
 
-/// What one half of a pixel has gathered.
+/// What one half of a pixel has gathered. The emitted and direct classes are sums over eye samples; what
+/// photons bring is a sum over rounds of means, weighted by the rounds' photons.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HalfSums {
     /// Radiance per class.
     pub classes: ClassSums,
     /// Irradiance that photons bring to the surface the eye sees first along its main way.
     pub irradiance: Vec3,
-    /// How many samples reached that surface, relative to all.
+    /// How many samples reached that surface, relative to all that looked photons up.
     pub arrivals: f32,
 }
 
-impl HalfSums {
-    /// Mean irradiance of the samples that reached the surface.
+/// Means of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelMeans {
+    /// Radiance per class in each half.
+    pub halves: [ClassSums; 2],
+    /// Irradiance of the surface on the main way, in each half.
+    pub irradiance: [Vec3; 2],
+    /// Radiance of the pixel per irradiance of that surface.
+    pub gain: Vec3,
+}
+
+impl PixelMeans {
+    /// Radiance per class, mean of the halves.
     #[must_use]
-    pub fn mean_irradiance(&self) -> Vec3 {
-        if self.arrivals > 0.0 { self.irradiance / self.arrivals } else { Vec3::ZERO }
+    pub fn class(&self, class: PathClass) -> Vec3 {
+        0.5 * (self.halves[0].get(class) + self.halves[1].get(class))
+    }
+
+    /// Radiance of all classes, mean of the halves.
+    #[must_use]
+    pub fn total(&self) -> Vec3 {
+        0.5 * (self.halves[0].total() + self.halves[1].total())
     }
 }
 
@@ -98,22 +116,24 @@ pub struct PixelSums {
     pub halves: [HalfSums; 2],
     /// The surface behind the pixel.
     pub guide: Guide,
+    /// Eye samples in each half.
+    pub samples: u32,
 }
 
 impl PixelSums {
-    pub(crate) fn scale(&mut self, factor: f32) {
-        self.guide.gain *= factor;
+    /// Scales what photons brought: to the mean over the look-ups of a round, or by the round's weight.
+    pub(crate) fn average_lookups(&mut self, weight: f32) {
+        self.guide.gain *= weight;
         for half in &mut self.halves {
-            half.irradiance *= factor;
-            half.arrivals *= factor;
-            for class in &mut half.classes.0 {
-                *class *= factor;
-            }
+            half.irradiance *= weight;
+            half.arrivals *= weight;
+            half.classes.0[PathClass::Caustic as usize] *= weight;
         }
     }
 
     fn add(&mut self, other: &Self) {
         self.guide.add(&other.guide);
+        self.samples += other.samples;
         for (mine, theirs) in self.halves.iter_mut().zip(&other.halves) {
             mine.irradiance += theirs.irradiance;
             mine.arrivals += theirs.arrivals;
@@ -121,6 +141,25 @@ impl PixelSums {
                 *a += *b;
             }
         }
+    }
+
+    fn means(&self, photon_weight: f32) -> PixelMeans {
+        let per_sample = 1.0 / self.samples.max(1) as f32;
+        let per_photon = if photon_weight > 0.0 { 1.0 / photon_weight } else { 0.0 };
+        let halves = self.halves.map(|half| {
+            let mut means = half.classes;
+            for class in PathClass::ALL {
+                means.0[class as usize] *= match class {
+                    PathClass::Emitted | PathClass::Direct => per_sample,
+                    PathClass::Caustic => per_photon,
+                };
+            }
+            means
+        });
+        let irradiance = self
+            .halves
+            .map(|half| if half.arrivals > 0.0 { half.irradiance / half.arrivals } else { Vec3::ZERO });
+        PixelMeans { halves, irradiance, gain: self.guide.gain * (0.5 * per_photon) }
     }
 
     /// The class that holds a number that is not finite, if any.
@@ -156,6 +195,8 @@ pub struct Film {
     width: u32,
     height: u32,
     rounds: u32,
+    /// Sum of the rounds' photon weights.
+    photon_weight: f32,
     pixels: Vec<PixelSums>,
 }
 
@@ -164,7 +205,7 @@ impl Film {
     #[must_use]
     pub fn new(width: u32, height: u32) -> Self {
         let pixels = vec![PixelSums::default(); width as usize * height as usize];
-        Self { width, height, rounds: 0, pixels }
+        Self { width, height, rounds: 0, photon_weight: 0.0, pixels }
     }
 
     /// Bytes a film of this size holds.
@@ -173,12 +214,25 @@ impl Film {
         u64::from(width) * u64::from(height) * size_of::<PixelSums>() as u64
     }
 
-    /// Adds the next round.
-    pub fn add_round(&mut self, round: &RoundFilm) {
+    /// Adds the next round, whose photons count `photon_weight` times those of the first.
+    pub fn add_round(&mut self, mut round: RoundFilm, photon_weight: f32) {
         self.rounds += 1;
-        for (sum, pixel) in self.pixels.iter_mut().zip(&round.pixels) {
+        self.photon_weight += photon_weight;
+        for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
+            pixel.average_lookups(photon_weight);
             sum.add(pixel);
         }
+    }
+
+    /// Means of every pixel, row by row.
+    pub fn means(&self) -> impl Iterator<Item = PixelMeans> + '_ {
+        self.pixels.iter().map(|pixel| pixel.means(self.photon_weight))
+    }
+
+    /// Sum of the rounds' photon weights.
+    #[must_use]
+    pub fn photon_weight(&self) -> f32 {
+        self.photon_weight
     }
 
     /// Number of rounds added.
@@ -190,24 +244,18 @@ impl Film {
     /// All classes together, as they were gathered: nothing is smoothed.
     #[must_use]
     pub fn raw_image(&self) -> LinearImage {
-        self.map(|pixel| pixel.halves[0].classes.total() + pixel.halves[1].classes.total())
+        self.map(|means| means.total())
     }
 
     /// One class, as it was gathered.
     #[must_use]
     pub fn raw_layer(&self, class: PathClass) -> LinearImage {
-        self.map(|pixel| pixel.halves[0].classes.get(class) + pixel.halves[1].classes.get(class))
+        self.map(|means| means.class(class))
     }
 
-    fn map(&self, sum: impl Fn(&PixelSums) -> Vec3) -> LinearImage {
-        let scale = self.mean_scale();
-        let pixels = self.pixels.iter().map(|p| (sum(p) * scale).to_array()).collect();
+    fn map(&self, value: impl Fn(&PixelMeans) -> Vec3) -> LinearImage {
+        let pixels = self.means().map(|means| value(&means).to_array()).collect();
         LinearImage { width: self.width, height: self.height, pixels }
-    }
-
-    /// Factor from the sum of both halves over all rounds to a mean.
-    pub(crate) fn mean_scale(&self) -> f32 {
-        if self.rounds == 0 { 0.0 } else { 0.5 / self.rounds as f32 }
     }
 
     /// Pixels across and down.
@@ -225,8 +273,9 @@ impl Film {
     /// Raw values for a checkpoint: rounds, then every number.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(4 + self.pixels.len() * PixelSums::WORDS * 4);
+        let mut bytes = Vec::with_capacity(8 + self.pixels.len() * PixelSums::WORDS * 4);
         bytes.extend(self.rounds.to_le_bytes());
+        bytes.extend(self.photon_weight.to_le_bytes());
         for pixel in &self.pixels {
             pixel.visit(|word| bytes.extend(word.to_le_bytes()));
         }
@@ -237,11 +286,13 @@ impl Film {
     #[must_use]
     pub fn from_bytes(width: u32, height: u32, bytes: &[u8]) -> Option<Self> {
         let mut film = Self::new(width, height);
-        let (rounds, values) = bytes.split_first_chunk::<4>()?;
+        let (rounds, rest) = bytes.split_first_chunk::<4>()?;
+        let (photon_weight, values) = rest.split_first_chunk::<4>()?;
         if values.len() != film.pixels.len() * PixelSums::WORDS * 4 {
             return None;
         }
         film.rounds = u32::from_le_bytes(*rounds);
+        film.photon_weight = f32::from_le_bytes(*photon_weight);
         let mut words = values.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
         for pixel in &mut film.pixels {
             pixel.fill(|| words.next().unwrap_or(0));
@@ -267,6 +318,7 @@ impl PixelSums {
         word(self.halves[0].arrivals.to_bits());
         word(self.halves[1].arrivals.to_bits());
         word(self.guide.view);
+        word(self.samples);
     }
 
     /// The inverse of [`PixelSums::visit`].
@@ -282,5 +334,6 @@ impl PixelSums {
         self.halves[0].arrivals = f32::from_bits(word());
         self.halves[1].arrivals = f32::from_bits(word());
         self.guide.view = word();
+        self.samples = word();
     }
 }

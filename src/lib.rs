@@ -55,6 +55,7 @@
 
 pub mod compare;
 pub mod develop;
+pub mod effort;
 pub mod film;
 pub mod geometry;
 pub mod image_io;

@@ -1,6 +1,6 @@
 //! The picture: the film with its caustics smoothed, in layers, and how far it may be from the truth.
 
-use crate::film::{Film, PixelSums};
+use crate::film::{Film, PixelMeans};
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::smooth::{Smoothing, smooth};
@@ -53,36 +53,50 @@ impl<'a> Picture<'a> {
         if self.film.rounds() == 0 {
             return None;
         }
-        let image = self.image();
-        let count = image.pixels.len() as f64;
-        let mean = image.pixels.iter().map(|p| mean_channel(*p)).sum::<f64>() / count;
-        if mean == 0.0 {
-            return Some(0.0);
-        }
-        let floor = (0.1 * mean).powi(2);
-        let relative = |(i, pixel): (usize, &PixelSums)| {
-            let value = Vec3::from_array(image.pixels[i]).as_dvec3();
-            let square = self.squared_error(i, pixel).as_dvec3();
-            (square / (value * value + floor)).element_sum() / 3.0
-        };
-        let sum: f64 = self.film.pixels().iter().enumerate().map(relative).sum();
-        Some((sum / count).sqrt() as f32)
+        let errors = self.errors();
+        let sum: f64 = errors.iter().map(|e| f64::from(e.sampled + e.photons)).sum();
+        Some((sum / errors.len() as f64).sqrt() as f32)
     }
 
-    /// Estimated squared error of a pixel per channel.
-    fn squared_error(&self, index: usize, pixel: &PixelSums) -> Vec3 {
-        let scale = self.film.mean_scale();
-        let [a, b] = &pixel.halves;
-        let mut difference = (a.classes.total() - b.classes.total()) * scale;
+    /// Estimated relative squared error of every pixel, by what makes it.
+    #[must_use]
+    pub fn errors(&self) -> Vec<PixelError> {
+        let image = self.image();
+        let mean = image.pixels.iter().map(|p| mean_channel(Vec3::from_array(*p))).sum::<f32>();
+        let floor = 0.1 * mean / image.pixels.len() as f32;
+        let pixels = self.film.means().zip(&image.pixels).enumerate();
+        pixels.map(|(i, (means, value))| self.error(i, &means, Vec3::from_array(*value), floor)).collect()
+    }
+
+    fn error(&self, index: usize, means: &PixelMeans, value: Vec3, floor: f32) -> PixelError {
+        let scale = value * value + floor * floor;
+        if scale.min_element() <= 0.0 {
+            return PixelError::default();
+        }
+        let half = |class| 0.5 * (means.halves[0].get(class) - means.halves[1].get(class));
+        let sampled = half(PathClass::Emitted) + half(PathClass::Direct);
+        let mut photons = half(PathClass::Caustic);
         let smoothed = self.smoothing.as_ref().and_then(|s| s.squared_error[index]);
         if smoothed.is_some() {
-            difference -= pixel.guide.gain * scale * 0.5 * (a.mean_irradiance() - b.mean_irradiance());
+            photons -= means.gain * 0.5 * (means.irradiance[0] - means.irradiance[1]);
         }
-        difference * difference + Vec3::splat(smoothed.unwrap_or(0.0))
+        let photons = photons * photons + Vec3::splat(smoothed.unwrap_or(0.0));
+        PixelError {
+            sampled: mean_channel(sampled * sampled / scale),
+            photons: mean_channel(photons / scale),
+        }
     }
 }
 
-/// Mean of a pixel's channels.
-fn mean_channel(pixel: [f32; 3]) -> f64 {
-    pixel.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
+/// Estimated squared error of a pixel, relative to its squared radiance; mean over channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelError {
+    /// Of what eye samples bring: emitted and direct light.
+    pub sampled: f32,
+    /// Of what photons bring.
+    pub photons: f32,
+}
+
+fn mean_channel(v: Vec3) -> f32 {
+    v.element_sum() / 3.0
 }

@@ -1,5 +1,6 @@
 //! The plan: what this scene needs, what is left out, and why.
 
+use crate::effort::MOST_SHIFT;
 use crate::film::Film;
 use crate::light_path::Bounce;
 use crate::pass1_light::{self, Block, Budget, Source, Tally, Window};
@@ -224,8 +225,16 @@ impl Plan {
         self.decide("structure", structure != "list", structure, reason);
     }
 
+    /// How many doublings of the photons per round memory allows.
+    #[must_use]
+    pub fn most_photon_shift(&self) -> u32 {
+        let photons: u64 = self.photons.iter().map(|b| 1_u64 << b.log2_block).sum();
+        MOST_LOG2.saturating_sub(photons.max(1).next_power_of_two().ilog2()).min(MOST_SHIFT)
+    }
+
     fn estimate_memory(&self, scene: &Scene) -> u64 {
-        let photons: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
+        let a_round: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
+        let photons = a_round << self.most_photon_shift();
         // While a tree is built its photons stand in memory in three forms: as traced (56 bytes), as entries
         // and in the tree's arrays, which double as they grow.
         let per_photon = 56 + 3 * photon_map::BYTES_PER_PHOTON;

@@ -1,12 +1,14 @@
 //! The method on one screen: pass 1, the photon maps, pass 2, the film; round after round until a stop.
 
+use crate::effort::{Effort, Measured};
 use crate::film::Film;
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
-use crate::pass1_light::{self, Tally};
+use crate::pass1_light::{self, Blocks, Tally};
 use crate::pass2_eye::{self, EyeContext, EyeCounts};
 use crate::picture::Picture;
 use crate::plan::Plan;
+use crate::sampling::hash;
 use crate::scene::Scene;
 use cpu_time::ProcessTime;
 use std::sync::Arc;
@@ -175,7 +177,11 @@ pub struct Render {
     pass2: PassTime,
     windows: Vec<Tally>,
     eye: EyeCounts,
-    /// Estimated at the last round that [`is_milestone`].
+    /// Blocks of photons used up.
+    blocks: u32,
+    /// Decided at the last round that [`is_milestone`].
+    effort: Effort,
+    /// Estimated then.
     error: Option<f32>,
 }
 
@@ -198,7 +204,18 @@ impl Render {
         let film = Film::new(scene.image.width, scene.image.height);
         let windows = vec![Tally::default(); plan.photons.len()];
         let time = PassTime::default();
-        Self { scene, plan, film, pass1: time, pass2: time, windows, eye: EyeCounts::default(), error: None }
+        Self {
+            scene,
+            plan,
+            film,
+            pass1: time,
+            pass2: time,
+            windows,
+            eye: EyeCounts::default(),
+            error: None,
+            blocks: 0,
+            effort: Effort::default(),
+        }
     }
 
     /// Renders the next round, in the rayon pool this is called in.
@@ -209,32 +226,64 @@ impl Render {
         control.start_round();
         let round = self.film.rounds();
         let start = Stopwatch::start();
+        let blocks = self.next_blocks();
         let photons = if self.plan.photons.is_empty() {
             None
         } else {
-            Some(pass1_light::emit_photons(&self.scene, &self.plan.photons, round, control)?)
+            Some(pass1_light::emit_photons(&self.scene, &self.plan.photons, blocks, control)?)
         };
         let mut pass1 = self.pass1;
         pass1.add(&start);
         let start = Stopwatch::start();
-        let context = EyeContext { scene: &self.scene, plan: &self.plan, photons: photons.as_ref(), round };
+        let context = EyeContext {
+            scene: &self.scene,
+            plan: &self.plan,
+            photons: photons.as_ref(),
+            round,
+            film: &self.film,
+            effort: &self.effort,
+        };
         let (film, eye) = pass2_eye::trace_image(&context, control)?;
-        self.film.add_round(&film);
-        self.update_error();
+        self.film.add_round(film, blocks.count as f32);
+        self.blocks = blocks.first + blocks.count;
         self.eye.add(&eye);
         for (sum, tally) in self.windows.iter_mut().zip(photons.iter().flat_map(|p| &p.tallies)) {
             sum.add(tally);
         }
         self.pass1 = pass1;
+        self.at_milestone();
         self.pass2.add(&start);
         Ok(RoundReport { rounds: self.rounds(), error: self.error_estimate(), seconds: self.seconds() })
     }
 
-    /// Estimates the error where the number of rounds is a milestone.
-    fn update_error(&mut self) {
-        if is_milestone(self.rounds()) {
-            self.error = self.picture().error_estimate();
+    /// The blocks of the next round: aligned, so that each is a net of its own.
+    fn next_blocks(&self) -> Blocks {
+        let count = 1 << self.effort.photon_shift;
+        Blocks { first: self.blocks.next_multiple_of(count), count }
+    }
+
+    /// Estimates the error where the number of rounds is a milestone, and decides what the next rounds do.
+    fn at_milestone(&mut self) {
+        if !is_milestone(self.rounds()) {
+            return;
         }
+        let picture = Picture::new(&self.film);
+        let errors = picture.errors();
+        let samples: Vec<u32> = self.film.pixels().iter().map(|p| p.samples).collect();
+        let sampled: u64 = samples.iter().map(|&n| 2 * u64::from(n)).sum();
+        let photon_rays: u64 = self.windows.iter().map(|t| t.rays).sum();
+        let weight = self.film.photon_weight();
+        let measured = Measured {
+            errors: &errors,
+            width: self.film.size().0,
+            samples: &samples,
+            photon_weight: weight,
+            rays_per_block: if weight > 0.0 { photon_rays as f32 / weight } else { 0.0 },
+            rays_per_sample: (self.eye.eye_rays + self.eye.shadow_rays) as f32 / sampled.max(1) as f32,
+        };
+        let key = hash(self.scene.render.seed, u64::from(self.rounds()));
+        self.effort = Effort::decide(&measured, self.plan.most_photon_shift(), key);
+        self.error = picture.error_estimate();
     }
 
     /// Why the render is finished; `None` while it is not.

@@ -12,7 +12,7 @@
 mod ladder;
 mod segment;
 
-use crate::film::{Film, PixelSums};
+use crate::film::{Film, PixelMeans};
 use glam::Vec3;
 use ladder::Ladder;
 use rayon::prelude::*;
@@ -45,13 +45,12 @@ struct Sample {
 /// Decides the widths and filters; `None` if the film holds no photons.
 #[must_use]
 pub fn smooth(film: &Film) -> Option<Smoothing> {
-    let scale = film.mean_scale();
-    let samples: Vec<Sample> = film.pixels().iter().map(|p| Sample::of(p, scale)).collect();
+    let samples: Vec<Sample> = film.means().map(|means| Sample::of(&means)).collect();
     if samples.iter().all(|s| s.irradiance == [Vec3::ZERO; 2]) {
         return None;
     }
-    let mean =
-        film.pixels().iter().map(|p| mean_channel(total(p) * scale)).sum::<f32>() / samples.len() as f32;
+    let sum: f32 = film.means().map(|means| mean_channel(means.total())).sum();
+    let mean = sum / samples.len() as f32;
     let filtered: Vec<(Segment, Ladder)> = segment::segments(film)
         .into_par_iter()
         .filter(|s| s.pixels.len() >= LEAST_PIXELS)
@@ -77,16 +76,11 @@ pub fn smooth(film: &Film) -> Option<Smoothing> {
 }
 
 impl Sample {
-    fn of(pixel: &PixelSums, scale: f32) -> Self {
-        let irradiance = pixel.halves.map(|h| h.mean_irradiance());
-        let gain = pixel.guide.gain * scale;
-        let rest = total(pixel) * scale - gain * 0.5 * (irradiance[0] + irradiance[1]);
+    fn of(means: &PixelMeans) -> Self {
+        let PixelMeans { irradiance, gain, .. } = *means;
+        let rest = means.total() - gain * 0.5 * (irradiance[0] + irradiance[1]);
         Self { irradiance, gain, rest: rest.max(Vec3::ZERO) }
     }
-}
-
-fn total(pixel: &PixelSums) -> Vec3 {
-    pixel.halves[0].classes.total() + pixel.halves[1].classes.total()
 }
 
 fn mean_channel(v: Vec3) -> f32 {

@@ -5,7 +5,8 @@ mod specular;
 
 pub use specular::EyeCounts;
 
-use crate::film::{PixelSums, RoundFilm};
+use crate::effort::Effort;
+use crate::film::{Film, PixelSums, RoundFilm};
 use crate::pass1_light::RoundPhotons;
 use crate::plan::Plan;
 use crate::render::{Control, RenderError};
@@ -28,6 +29,10 @@ pub struct EyeContext<'a> {
     pub photons: Option<&'a RoundPhotons>,
     /// Number of the round.
     pub round: u32,
+    /// The film so far: where each pixel's sequence goes on.
+    pub film: &'a Film,
+    /// Which pixels get more samples.
+    pub effort: &'a Effort,
 }
 
 /// Traces this round's eye samples of every pixel, in two independent halves.
@@ -73,7 +78,8 @@ fn trace_tile(context: &EyeContext<'_>, x: u32, y: u32) -> Result<Tile, RenderEr
     let mut pixels = Vec::with_capacity((width * height) as usize);
     for py in y..y + height {
         for px in x..x + width {
-            let sums = trace_pixel(context, &mut walk, px, py);
+            let index = py as usize * image.width as usize + px as usize;
+            let sums = trace_pixel(context, &mut walk, (px, py), index);
             if let Some(class) = sums.not_finite() {
                 return Err(RenderError::NotFinite { x: px, y: py, round: context.round, class });
             }
@@ -83,19 +89,27 @@ fn trace_tile(context: &EyeContext<'_>, x: u32, y: u32) -> Result<Tile, RenderEr
     Ok(Tile { x, y, width, pixels, counts: walk.counts })
 }
 
-/// One pixel's samples of this round in both halves, averaged per half.
-fn trace_pixel(context: &EyeContext<'_>, walk: &mut EyeWalk<'_>, x: u32, y: u32) -> PixelSums {
-    let mut sums = PixelSums::default();
-    let per_round = context.plan.eye_samples;
+/// One pixel's samples of this round in both halves: first those that look photons up, then the extra ones.
+fn trace_pixel(
+    context: &EyeContext<'_>,
+    walk: &mut EyeWalk<'_>,
+    (x, y): (u32, u32),
+    index: usize,
+) -> PixelSums {
+    let first = context.film.pixels()[index].samples;
+    let gathering = context.plan.eye_samples;
+    let extra = context.effort.extra.get(index).map_or(0, |&n| u32::from(n));
+    let mut sums = PixelSums { samples: gathering + extra, ..PixelSums::default() };
     for half in 0..2 {
         let seed = pixel_seed(context.scene.render.seed, x, y, half);
-        for i in 0..per_round {
-            let sample = SamplePoint::new(seed, context.round.wrapping_mul(per_round).wrapping_add(i));
+        for i in 0..gathering + extra {
+            let sample = SamplePoint::new(seed, first.wrapping_add(i));
             let raster = Vec2::new(x as f32, y as f32) + sample.get_2d(0);
-            walk.trace(raster, half as usize, sample, &mut sums);
+            walk.start(half as usize, sample, i < gathering);
+            walk.trace(raster, &mut sums);
         }
     }
-    sums.scale(1.0 / per_round as f32);
+    sums.average_lookups(1.0 / gathering as f32);
     sums
 }
 

@@ -11,6 +11,7 @@ use crate::film::{Guide, PixelSums};
 use crate::geometry::{Hit, Ray, offset_origin};
 use crate::light_path::PathClass;
 use crate::optics::{self, Event, Interaction, Outcome};
+use crate::pass1_light::RoundPhotons;
 use crate::photon_map::Lookup;
 use crate::sampling::SamplePoint;
 use crate::scene::{Light, Material, Texture};
@@ -60,6 +61,7 @@ pub(super) struct EyeWalk<'a> {
     /// The eye sample that is being followed.
     half: usize,
     sample: SamplePoint,
+    photons: Option<&'a RoundPhotons>,
     pub(super) counts: EyeCounts,
 }
 
@@ -82,13 +84,26 @@ impl<'a> EyeWalk<'a> {
         let pixels = context.plan.radius.pixels(context.round) as f32;
         let kernel_spread = context.scene.camera.pixel_spread() * pixels;
         let sample = SamplePoint::new(0, 0);
-        Self { context, kernel_spread, stack: Vec::new(), half: 0, sample, counts: EyeCounts::default() }
+        Self {
+            context,
+            kernel_spread,
+            stack: Vec::new(),
+            half: 0,
+            sample,
+            photons: None,
+            counts: EyeCounts::default(),
+        }
+    }
+
+    /// Sets the sample that is followed next, and whether it looks photons up.
+    pub(super) fn start(&mut self, half: usize, sample: SamplePoint, gathers: bool) {
+        (self.half, self.sample) = (half, sample);
+        self.photons = if gathers { self.context.photons } else { None };
     }
 
     /// Adds what arrives along one eye ray to the classes' sums.
-    pub(super) fn trace(&mut self, raster: Vec2, half: usize, sample: SamplePoint, sums: &mut PixelSums) {
+    pub(super) fn trace(&mut self, raster: Vec2, sums: &mut PixelSums) {
         let ray = self.context.scene.camera.ray(raster);
-        (self.half, self.sample) = (half, sample);
         self.stack.clear();
         self.stack.push(Branch {
             ray,
@@ -194,7 +209,7 @@ impl<'a> EyeWalk<'a> {
         let sample = self.sample.branch(branch.key);
         let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
         sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);
-        if let Some(photons) = self.context.photons {
+        if let Some(photons) = self.photons {
             let radius = (branch.travelled + hit.t) * self.kernel_spread;
             let lookup = Lookup { point: hit.surface.point, normal, sheet: hit.sheet, radius };
             self.counts.lookups += 1;
