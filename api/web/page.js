@@ -10,6 +10,7 @@ const LIST_INTERVAL = 3000;
 const WORDS = { queued: "queued", running: "rendering", succeeded: "done", failed: "failed", cancelled: "cancelled" };
 
 let following = null; // { id, stop, history }
+let chosen = null; // the sample in the editor, as long as it is not changed
 let shownUrl = null;
 let listLength = 8;
 
@@ -42,44 +43,75 @@ async function loadSamples() {
   const first = Math.max(0, samples.findIndex((sample) => sample.name === "glass-ball"));
   if (!samples.length || $("scene").value) return;
   $("samples").querySelectorAll("input")[first].checked = true;
-  setScene(texts[first]);
+  chooseSample(samples[first], texts[first]);
 }
 
 function card(sample, text) {
   const label = make("label", "card");
   const input = Object.assign(make("input"), { type: "radio", name: "sample", value: sample.name });
-  input.addEventListener("change", () => (setScene(text), showSketch()));
+  input.addEventListener("change", () => chooseSample(sample, text));
+  label.append(input, sample.picture ? pictureOf(sample) : sketchOf(text), make("span", "card-title", sample.title));
+  return label;
+}
+
+function pictureOf(sample) {
+  return Object.assign(make("img"), { src: sample.picture, alt: "", width: 400, height: 300 });
+}
+
+function sketchOf(text) {
   const sketch = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   sketch.setAttribute("aria-hidden", "true");
   drawSketch(sketch, parsed(text));
-  label.append(input, sketch, make("span", "card-title", sample.title));
-  return label;
+  return sketch;
+}
+
+function chooseSample(sample, text) {
+  setScene(text);
+  chosen = sample;
+  showScene();
 }
 
 function setScene(text) {
   $("scene").value = text;
   $("scene").scrollTop = 0;
   $("edited").hidden = true;
+  chosen = null;
   clearProblem();
   numberLines();
-  redraw();
 }
 
 let redrawing;
 function sceneEdited() {
   $("edited").hidden = false;
+  chosen = null;
   clearProblem();
   numberLines();
   clearTimeout(redrawing);
-  redrawing = setTimeout(redraw, 150);
+  redrawing = setTimeout(() => following || showScene(), 150);
 }
 
-function redraw() {
+/** What the frame shows while no job is followed: the sample's picture, or the outline of what is edited. */
+function showScene() {
+  if (location.hash) history.replaceState(null, "", location.pathname);
+  following?.stop.abort();
+  following = null;
+  for (const id of ["layers", "progress", "cancel", "reuse", "download", "download-exr", "plan-box"]) $(id).hidden = true;
+  drawErrorChart($("chart"), []);
+  for (const id of ["rounds", "error", "time"]) $(id).textContent = "–";
   const scene = parsed($("scene").value);
-  if (scene && drawSketch($("sketch"), scene) && !following) {
-    $("size").textContent = `${scene.image?.width ?? 640} × ${scene.image?.height ?? 480}`;
-    shapeFrame(scene.image?.width ?? 640, scene.image?.height ?? 480);
+  if (scene) {
+    const { width = 640, height = 480 } = scene.image ?? {};
+    $("size").textContent = `${width} × ${height}`;
+    shapeFrame(width, height);
+    drawSketch($("sketch"), scene);
   }
+  const picture = chosen?.picture ?? null;
+  show(picture, picture ? `What ${chosen.title} looks like` : "");
+  setState("sketch", picture ? "sample" : "outline");
+  const hidden = JSON.stringify(scene?.objects ?? []).includes('"asset"') ? " Meshes from files are not outlined." : "";
+  $("said").textContent = picture
+    ? "This sample as it looks when it is done. “Render” makes your own."
+    : `Outline through the scene's camera.${hidden} “Render” makes the picture.`;
 }
 
 function parsed(text) {
@@ -191,7 +223,7 @@ function followAddress() {
   const id = location.hash.slice(1);
   following?.stop.abort();
   following = null;
-  if (!/^[0-9a-f-]{36}$/.test(id)) return showSketch();
+  if (!/^[0-9a-f-]{36}$/.test(id)) return showScene();
   following = { id, stop: new AbortController(), history: [] };
   show(null);
   follow(following).catch((error) => error.name === "AbortError" || lostJob(error));
@@ -200,6 +232,7 @@ function followAddress() {
 async function follow(current) {
   const { id, stop, history } = current;
   let seen = 0;
+  let state = "";
   for await (const job of nephroid.follow(id, { signal: stop.signal, interval: 400 })) {
     if (current !== following) return;
     const last = history.at(-1)?.rounds ?? 0;
@@ -207,31 +240,20 @@ async function follow(current) {
       history.push({ rounds: job.rounds, error: job.error_estimate });
     }
     showJob(job);
-    if (job.state === "running" && job.rounds > seen) {
+    if (job.state !== state) refreshJobs();
+    state = job.state;
+    if (state === "running" && job.rounds > seen) {
       seen = job.rounds;
       const blob = await nephroid.preview(id, { signal: stop.signal });
       if (blob && current === following) await show(URL.createObjectURL(blob), "The picture so far");
     }
   }
-  refreshJobs();
 }
 
 function lostJob(error) {
   following = null;
-  showSketch();
+  showScene();
   showProblem(error);
-}
-
-function showSketch() {
-  if (location.hash) history.replaceState(null, "", location.pathname);
-  following?.stop.abort();
-  following = null;
-  show(null);
-  for (const id of ["layers", "progress", "cancel", "reuse", "download", "download-exr", "chart", "plan-box"]) $(id).hidden = true;
-  for (const id of ["rounds", "error", "time"]) $(id).textContent = "–";
-  setState("sketch", "sketch");
-  $("said").textContent = "Outline through the scene's camera. The picture comes with “Render”.";
-  redraw();
 }
 
 function showJob(job) {
@@ -385,7 +407,7 @@ function removeButton(job) {
   button.title = job.done ? "Delete" : "Cancel and delete";
   button.addEventListener("click", async () => {
     await nephroid.remove(job.id).catch(showProblem);
-    if (job.id === following?.id) showSketch();
+    if (job.id === following?.id) showScene();
     refreshJobs();
   });
   return button;
