@@ -3,16 +3,20 @@
 import { Nephroid } from "./nephroid.js";
 import { drawSketch } from "./sketch.js";
 import { drawErrorChart } from "./chart.js";
+import { RecentRenders, WORDS, make } from "./recent.js";
 
 const nephroid = new Nephroid();
 const $ = (id) => document.getElementById(id);
-const LIST_INTERVAL = 3000;
-const WORDS = { queued: "queued", running: "rendering", succeeded: "done", failed: "failed", cancelled: "cancelled" };
+
+const recent = new RecentRenders(nephroid, {
+  shown: () => following?.id,
+  removed: (id) => id === following?.id && showScene(),
+  failed: showProblem,
+});
 
 let following = null; // { id, stop, history }
 let chosen = null; // the sample in the editor, as long as it is not changed
 let shownUrl = null;
-let listLength = 8;
 
 start();
 
@@ -21,16 +25,14 @@ async function start() {
   $("plan").addEventListener("click", showPlan);
   $("cancel").addEventListener("click", () => following && nephroid.cancel(following.id).then(showJob, showProblem));
   $("reuse").addEventListener("click", reuseScene);
-  $("more").addEventListener("click", () => ((listLength += 16), refreshJobs()));
   $("scene").addEventListener("input", sceneEdited);
   $("scene").addEventListener("scroll", () => ($("gutter").scrollTop = $("scene").scrollTop));
   $("scene").addEventListener("keydown", (event) => {
     if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) submitScene();
   });
   window.addEventListener("hashchange", followAddress);
-  document.addEventListener("visibilitychange", () => document.hidden || refreshJobs());
-  setInterval(() => document.hidden || refreshJobs(), LIST_INTERVAL);
-  await Promise.all([loadSamples(), refreshJobs()]).catch(showProblem);
+  recent.start();
+  await loadSamples().catch(showProblem);
   followAddress();
 }
 
@@ -139,7 +141,7 @@ async function submitScene() {
     const job = await nephroid.submit($("scene").value);
     location.hash = job.id;
     if (matchMedia("(max-width: 60rem)").matches) $("picture-title").scrollIntoView({ block: "start" });
-    refreshJobs();
+    recent.refresh();
   } catch (error) {
     showProblem(error);
   } finally {
@@ -240,7 +242,7 @@ async function follow(current) {
       history.push({ rounds: job.rounds, error: job.error_estimate });
     }
     showJob(job);
-    if (job.state !== state) refreshJobs();
+    if (job.state !== state) recent.refresh();
     state = job.state;
     if (state === "running" && job.rounds > seen) {
       seen = job.rounds;
@@ -363,64 +365,7 @@ function fillPlan(plan) {
   $("plan-box").hidden = false;
 }
 
-// ---- recent renders
-
-async function refreshJobs() {
-  let page;
-  try {
-    page = await nephroid.list({ limit: Math.min(listLength, 100) });
-  } catch {
-    return; // the next turn tries again
-  }
-  $("no-jobs").hidden = page.renders.length > 0;
-  $("more").hidden = !page.next_cursor || listLength >= 100;
-  const known = new Map([...$("jobs").children].map((item) => [item.dataset.id, item]));
-  $("jobs").replaceChildren(...page.renders.map((job) => jobItem(job, known.get(job.id))));
-}
-
-function jobItem(job, known) {
-  const version = JSON.stringify([job.state, Math.round(job.progress * 100), job.id === following?.id]);
-  if (known?.dataset.version === version) return known;
-  const item = make("li");
-  Object.assign(item.dataset, { id: job.id, version });
-  const link = Object.assign(make("a"), { href: `#${job.id}` });
-  if (job.id === following?.id) link.setAttribute("aria-current", "true");
-  const picture = make("span", "thumb");
-  if (job.links.image) {
-    picture.append(Object.assign(make("img"), { src: job.links.image, alt: "", loading: "lazy" }));
-  }
-  const words = make("span", "job-words");
-  const progress = job.state === "running" ? ` ${Math.round(job.progress * 100)} %` : "";
-  words.append(make("span", "job-name", job.name || "unnamed scene"),
-               make("span", "quiet", `${when(job.created_at)} · ${job.width} × ${job.height}`));
-  const state = make("span", "state", WORDS[job.state] + progress);
-  state.dataset.state = job.state;
-  words.append(state);
-  link.append(picture, words);
-  item.append(link, removeButton(job));
-  return item;
-}
-
-function removeButton(job) {
-  const button = Object.assign(make("button", "remove", "×"), { type: "button" });
-  button.setAttribute("aria-label", `${job.done ? "Delete" : "Cancel and delete"} ${job.name || "unnamed scene"}`);
-  button.title = job.done ? "Delete" : "Cancel and delete";
-  button.addEventListener("click", async () => {
-    await nephroid.remove(job.id).catch(showProblem);
-    if (job.id === following?.id) showScene();
-    refreshJobs();
-  });
-  return button;
-}
-
 // ---- words and elements
-
-function make(tag, className = "", text = "") {
-  const element = document.createElement(tag);
-  if (className) element.className = className;
-  if (text) element.textContent = text;
-  return element;
-}
 
 const percent = (fraction) => `${(100 * fraction).toPrecision(2)} %`;
 const slug = (name) => name.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "") || "render";
@@ -428,10 +373,4 @@ const slug = (name) => name.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^
 function elapsed(job) {
   const end = job.finished_at ? Date.parse(job.finished_at) : Date.now();
   return `${Math.max(0, (end - Date.parse(job.started_at)) / 1000).toFixed(1)} s`;
-}
-
-function when(time) {
-  const date = new Date(time);
-  const today = date.toDateString() === new Date().toDateString();
-  return today ? date.toLocaleTimeString() : date.toLocaleDateString();
 }
