@@ -288,7 +288,7 @@ function sentence(job) {
     case "failed":
       return `Failed: ${job.error?.detail ?? "no reason is known"}`;
     default:
-      return "Cancelled. Nothing is kept of it.";
+      return "Cancelled. What you may see of it here is not kept.";
   }
 }
 

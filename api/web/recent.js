@@ -34,7 +34,7 @@ export class RecentRenders {
     byId("no-jobs").hidden = page.renders.length > 0;
     byId("more").hidden = !page.next_cursor || this.#length >= MOST;
     const known = new Map([...byId("jobs").children].map((item) => [item.dataset.id, item]));
-    byId("jobs").replaceChildren(...page.renders.map((job) => this.#item(job, known.get(job.id))));
+    replaceItems(byId("jobs"), page.renders.map((job) => this.#item(job, known.get(job.id))));
   }
 
   #item(job, known) {
@@ -44,11 +44,6 @@ export class RecentRenders {
     const item = make("li");
     Object.assign(item.dataset, { id: job.id, version });
     item.append(linkTo(job, shown), this.#removeButton(job));
-    // A list that is renewed must not take the keyboard's place away.
-    if (known?.contains(document.activeElement)) {
-      const tag = document.activeElement.tagName;
-      requestAnimationFrame(() => item.querySelector(tag)?.focus());
-    }
     return item;
   }
 
@@ -63,6 +58,16 @@ export class RecentRenders {
     });
     return button;
   }
+}
+
+/** Changes the list only where it differs, and leaves the keyboard where it was. */
+function replaceItems(list, items) {
+  const same = items.length === list.children.length && items.every((item, i) => item === list.children[i]);
+  if (same) return;
+  const focused = list.contains(document.activeElement) ? document.activeElement : null;
+  const [id, tag] = [focused?.closest("li").dataset.id, focused?.tagName];
+  list.replaceChildren(...items);
+  if (focused) items.find((item) => item.dataset.id === id)?.querySelector(tag).focus({ preventScroll: true });
 }
 
 function linkTo(job, shown) {
