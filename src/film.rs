@@ -1,5 +1,6 @@
-//! The film: one layer per class of paths and half, as a mean over rounds.
+//! The film: one layer per class of paths and half, summed over rounds.
 
+use crate::geometry::SheetId;
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use glam::Vec3;
@@ -32,25 +33,88 @@ impl ClassSums {
     }
 }
 
+/// What one half of a pixel has gathered.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HalfSums {
+    /// Radiance per class.
+    pub classes: ClassSums,
+    /// Irradiance that photons bring to the surface the eye sees first along its main way.
+    pub irradiance: Vec3,
+    /// How many samples reached that surface, relative to all.
+    pub arrivals: f32,
+}
+
+impl HalfSums {
+    /// Mean irradiance of the samples that reached the surface.
+    #[must_use]
+    pub fn mean_irradiance(&self) -> Vec3 {
+        if self.arrivals > 0.0 { self.irradiance / self.arrivals } else { Vec3::ZERO }
+    }
+}
+
+/// The surface that the eye's main way through a pixel leads to: what may be smoothed with what.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Guide {
+    /// Radiance of the pixel per irradiance of that surface, summed over halves.
+    pub gain: Vec3,
+    /// A point of it, from the first sample.
+    pub position: Vec3,
+    /// Its normal there.
+    pub normal: Vec3,
+    /// Its sheet, by [`Guide::sheet_code`]; 0 if no sample reached a surface.
+    pub sheet: u32,
+}
+
+impl Guide {
+    /// Code of a pixel whose samples reached several sheets.
+    pub const MIXED: u32 = u32::MAX;
+
+    /// Code of a pixel whose samples all reached this sheet.
+    #[must_use]
+    pub fn sheet_code(sheet: SheetId) -> u32 {
+        sheet.0 + 1
+    }
+
+    /// Adds another sample's, or another round's.
+    pub(crate) fn add(&mut self, other: &Self) {
+        if self.sheet == 0 {
+            *self = *other;
+            return;
+        }
+        self.gain += other.gain;
+        if other.sheet != 0 && other.sheet != self.sheet {
+            self.sheet = Self::MIXED;
+        }
+    }
+}
+
 /// One pixel: two independent halves, each an estimate of the same radiance, W·sr⁻¹·m⁻².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelSums {
     /// Half A and half B.
-    pub halves: [ClassSums; 2],
+    pub halves: [HalfSums; 2],
+    /// The surface behind the pixel.
+    pub guide: Guide,
 }
 
 impl PixelSums {
     pub(crate) fn scale(&mut self, factor: f32) {
+        self.guide.gain *= factor;
         for half in &mut self.halves {
-            for class in &mut half.0 {
+            half.irradiance *= factor;
+            half.arrivals *= factor;
+            for class in &mut half.classes.0 {
                 *class *= factor;
             }
         }
     }
 
     fn add(&mut self, other: &Self) {
+        self.guide.add(&other.guide);
         for (mine, theirs) in self.halves.iter_mut().zip(&other.halves) {
-            for (a, b) in mine.0.iter_mut().zip(&theirs.0) {
+            mine.irradiance += theirs.irradiance;
+            mine.arrivals += theirs.arrivals;
+            for (a, b) in mine.classes.0.iter_mut().zip(&theirs.classes.0) {
                 *a += *b;
             }
         }
@@ -58,7 +122,7 @@ impl PixelSums {
 
     /// The class that holds a number that is not finite, if any.
     pub(crate) fn not_finite(&self) -> Option<PathClass> {
-        PathClass::ALL.into_iter().find(|&c| self.halves.iter().any(|h| !h.get(c).is_finite()))
+        PathClass::ALL.into_iter().find(|&c| self.halves.iter().any(|h| !h.classes.get(c).is_finite()))
     }
 }
 
@@ -120,59 +184,48 @@ impl Film {
         self.rounds
     }
 
-    /// All classes together.
+    /// All classes together, as they were gathered: nothing is smoothed.
     #[must_use]
-    pub fn image(&self) -> LinearImage {
-        self.map(|pixel| pixel.halves[0].total() + pixel.halves[1].total())
+    pub fn raw_image(&self) -> LinearImage {
+        self.map(|pixel| pixel.halves[0].classes.total() + pixel.halves[1].classes.total())
     }
 
-    /// One class.
+    /// One class, as it was gathered.
     #[must_use]
-    pub fn layer(&self, class: PathClass) -> LinearImage {
-        self.map(|pixel| pixel.halves[0].get(class) + pixel.halves[1].get(class))
+    pub fn raw_layer(&self, class: PathClass) -> LinearImage {
+        self.map(|pixel| pixel.halves[0].classes.get(class) + pixel.halves[1].classes.get(class))
     }
 
     fn map(&self, sum: impl Fn(&PixelSums) -> Vec3) -> LinearImage {
-        let scale = if self.rounds == 0 { 0.0 } else { 0.5 / self.rounds as f32 };
+        let scale = self.mean_scale();
         let pixels = self.pixels.iter().map(|p| (sum(p) * scale).to_array()).collect();
         LinearImage { width: self.width, height: self.height, pixels }
     }
 
-    /// Estimated relative error of the image: the root of the mean over pixels and channels of
-    /// σ² / (L² + (0.1 L_mean)²), with σ² = (A - B)²/4 the unbiased estimate of the mean's variance from its
-    /// two independent halves. Systematic error of the density estimate is not in it. `None` before the
-    /// first round.
+    /// Factor from the sum of both halves over all rounds to a mean.
+    pub(crate) fn mean_scale(&self) -> f32 {
+        if self.rounds == 0 { 0.0 } else { 0.5 / self.rounds as f32 }
+    }
+
+    /// Pixels across and down.
     #[must_use]
-    pub fn error_estimate(&self) -> Option<f32> {
-        if self.rounds == 0 {
-            return None;
-        }
-        let scale = 0.5 / self.rounds as f32;
-        let halves = |p: &PixelSums| (p.halves[0].total() * scale, p.halves[1].total() * scale);
-        let count = self.pixels.len() as f64;
-        let mean = self.pixels.iter().map(|p| luminous(halves(p).0 + halves(p).1)).sum::<f64>() / count;
-        let floor = (0.1 * mean).powi(2);
-        if mean == 0.0 {
-            return Some(0.0);
-        }
-        let relative = |p: &PixelSums| {
-            let (a, b) = halves(p);
-            let value = (a + b).as_dvec3();
-            let deviation = (a - b).as_dvec3();
-            (deviation * deviation / (value * value + floor)).element_sum() / 3.0
-        };
-        Some((self.pixels.iter().map(relative).sum::<f64>() / count).sqrt() as f32)
+    pub fn size(&self) -> (usize, usize) {
+        (self.width as usize, self.height as usize)
+    }
+
+    /// The sums over all rounds, row by row.
+    #[must_use]
+    pub fn pixels(&self) -> &[PixelSums] {
+        &self.pixels
     }
 
     /// Raw values for a checkpoint: rounds, then every number.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(4 + self.pixels.len() * size_of::<PixelSums>());
+        let mut bytes = Vec::with_capacity(4 + self.pixels.len() * PixelSums::WORDS * 4);
         bytes.extend(self.rounds.to_le_bytes());
-        for value in self.pixels.iter().flat_map(|p| p.halves.iter().flat_map(|h| h.0.iter())) {
-            for channel in value.to_array() {
-                bytes.extend(channel.to_le_bytes());
-            }
+        for pixel in &self.pixels {
+            pixel.visit(|word| bytes.extend(word.to_le_bytes()));
         }
         bytes
     }
@@ -182,18 +235,49 @@ impl Film {
     pub fn from_bytes(width: u32, height: u32, bytes: &[u8]) -> Option<Self> {
         let mut film = Self::new(width, height);
         let (rounds, values) = bytes.split_first_chunk::<4>()?;
-        if values.len() != film.pixels.len() * size_of::<PixelSums>() {
+        if values.len() != film.pixels.len() * PixelSums::WORDS * 4 {
             return None;
         }
         film.rounds = u32::from_le_bytes(*rounds);
-        let mut channels = values.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
-        for value in film.pixels.iter_mut().flat_map(|p| p.halves.iter_mut().flat_map(|h| h.0.iter_mut())) {
-            *value = Vec3::new(channels.next()?, channels.next()?, channels.next()?);
+        let mut words = values.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
+        for pixel in &mut film.pixels {
+            pixel.fill(|| words.next().unwrap_or(0));
         }
         Some(film)
     }
 }
 
-fn luminous(v: Vec3) -> f64 {
-    f64::from(v.element_sum()) / 3.0
+impl PixelSums {
+    /// Number of 32-bit words in a pixel.
+    const WORDS: usize = size_of::<Self>() / 4;
+
+    /// The numbers of a pixel as 32-bit words, in a fixed order.
+    fn visit(&self, mut word: impl FnMut(u32)) {
+        let mut vector = |v: Vec3| v.to_array().into_iter().for_each(|x| word(x.to_bits()));
+        for half in &self.halves {
+            half.classes.0.iter().for_each(|v| vector(*v));
+            vector(half.irradiance);
+        }
+        vector(self.guide.gain);
+        vector(self.guide.position);
+        vector(self.guide.normal);
+        word(self.halves[0].arrivals.to_bits());
+        word(self.halves[1].arrivals.to_bits());
+        word(self.guide.sheet);
+    }
+
+    /// The inverse of [`PixelSums::visit`].
+    fn fill(&mut self, mut word: impl FnMut() -> u32) {
+        let mut vector = || Vec3::from_array(std::array::from_fn(|_| f32::from_bits(word())));
+        for half in &mut self.halves {
+            half.classes.0.iter_mut().for_each(|v| *v = vector());
+            half.irradiance = vector();
+        }
+        self.guide.gain = vector();
+        self.guide.position = vector();
+        self.guide.normal = vector();
+        self.halves[0].arrivals = f32::from_bits(word());
+        self.halves[1].arrivals = f32::from_bits(word());
+        self.guide.sheet = word();
+    }
 }

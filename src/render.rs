@@ -5,6 +5,7 @@ use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::pass1_light::{self, Tally};
 use crate::pass2_eye::{self, EyeContext, EyeCounts};
+use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::scene::Scene;
 use cpu_time::ProcessTime;
@@ -174,6 +175,8 @@ pub struct Render {
     pass2: PassTime,
     windows: Vec<Tally>,
     eye: EyeCounts,
+    /// Estimated at the last round that [`is_milestone`].
+    error: Option<f32>,
 }
 
 /// With no limit given at all, this many rounds end a render that never reaches its error.
@@ -182,6 +185,12 @@ const MOST_ROUNDS: u32 = 1 << 20;
 /// Fewer rounds tell too little about the error to stop by it.
 const LEAST_ROUNDS: u32 = 2;
 
+/// True for 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, …: at these numbers of rounds the error is estimated and the
+/// render may stop by it. Between them the picture gains too little to be worth the estimate.
+fn is_milestone(rounds: u32) -> bool {
+    rounds.is_power_of_two() || (rounds.is_multiple_of(3) && (rounds / 3).is_power_of_two())
+}
+
 impl Render {
     /// A render that has yet to start.
     #[must_use]
@@ -189,7 +198,7 @@ impl Render {
         let film = Film::new(scene.image.width, scene.image.height);
         let windows = vec![Tally::default(); plan.photons.len()];
         let time = PassTime::default();
-        Self { scene, plan, film, pass1: time, pass2: time, windows, eye: EyeCounts::default() }
+        Self { scene, plan, film, pass1: time, pass2: time, windows, eye: EyeCounts::default(), error: None }
     }
 
     /// Renders the next round, in the rayon pool this is called in.
@@ -211,6 +220,7 @@ impl Render {
         let context = EyeContext { scene: &self.scene, plan: &self.plan, photons: photons.as_ref(), round };
         let (film, eye) = pass2_eye::trace_image(&context, control)?;
         self.film.add_round(&film);
+        self.update_error();
         self.eye.add(&eye);
         for (sum, tally) in self.windows.iter_mut().zip(photons.iter().flat_map(|p| &p.tallies)) {
             sum.add(tally);
@@ -218,6 +228,13 @@ impl Render {
         self.pass1 = pass1;
         self.pass2.add(&start);
         Ok(RoundReport { rounds: self.rounds(), error: self.error_estimate(), seconds: self.seconds() })
+    }
+
+    /// Estimates the error where the number of rounds is a milestone.
+    fn update_error(&mut self) {
+        if is_milestone(self.rounds()) {
+            self.error = self.picture().error_estimate();
+        }
     }
 
     /// Why the render is finished; `None` while it is not.
@@ -229,6 +246,7 @@ impl Render {
         }
         if let (Some(target), Some(error)) = (stop.error, self.error_estimate())
             && self.rounds() >= LEAST_ROUNDS
+            && is_milestone(self.rounds())
             && error <= target
         {
             return Some(StopReason::Error);
@@ -260,10 +278,10 @@ impl Render {
         self.film.rounds()
     }
 
-    /// Estimated relative error so far (see [`Film::error_estimate`]).
+    /// Estimated relative error at the last milestone (see [`Picture::error_estimate`]).
     #[must_use]
     pub fn error_estimate(&self) -> Option<f32> {
-        self.film.error_estimate()
+        self.error
     }
 
     /// Seconds spent in [`Render::run_round`].
@@ -275,13 +293,19 @@ impl Render {
     /// The picture so far.
     #[must_use]
     pub fn image(&self) -> LinearImage {
-        self.film.image()
+        self.picture().image()
+    }
+
+    /// The smoothed picture so far, from which image and layers can be had without smoothing again.
+    #[must_use]
+    pub fn picture(&self) -> Picture<'_> {
+        Picture::new(&self.film)
     }
 
     /// One class of paths so far; the layers add up to the picture.
     #[must_use]
     pub fn layer(&self, class: PathClass) -> LinearImage {
-        self.film.layer(class)
+        self.picture().layer(class)
     }
 
     /// The scene that is rendered.

@@ -92,7 +92,7 @@ fn trace_pixel(context: &EyeContext<'_>, walk: &mut EyeWalk<'_>, x: u32, y: u32)
         for i in 0..per_round {
             let sample = SamplePoint::new(seed, context.round.wrapping_mul(per_round).wrapping_add(i));
             let raster = Vec2::new(x as f32, y as f32) + sample.get_2d(0);
-            walk.trace(raster, half as usize, sample, &mut sums.halves[half as usize]);
+            walk.trace(raster, half as usize, sample, &mut sums);
         }
     }
     sums.scale(1.0 / per_round as f32);

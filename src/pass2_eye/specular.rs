@@ -7,10 +7,10 @@
 
 use super::EyeContext;
 use super::direct::{Receiver, direct_light};
-use crate::film::ClassSums;
+use crate::film::{Guide, PixelSums};
 use crate::geometry::{Hit, Ray, offset_origin};
 use crate::light_path::PathClass;
-use crate::optics::{self, Interaction, Outcome};
+use crate::optics::{self, Event, Interaction, Outcome};
 use crate::photon_map::Lookup;
 use crate::sampling::SamplePoint;
 use crate::scene::{Light, Material, Texture};
@@ -73,6 +73,8 @@ struct Branch {
     travelled: f32,
     /// Which ways were taken: one bit per S, after a leading 1.
     key: u64,
+    /// The eye's main way: refracted where it can be, and never by chance.
+    main: bool,
 }
 
 impl<'a> EyeWalk<'a> {
@@ -84,21 +86,28 @@ impl<'a> EyeWalk<'a> {
     }
 
     /// Adds what arrives along one eye ray to the classes' sums.
-    pub(super) fn trace(&mut self, raster: Vec2, half: usize, sample: SamplePoint, sums: &mut ClassSums) {
+    pub(super) fn trace(&mut self, raster: Vec2, half: usize, sample: SamplePoint, sums: &mut PixelSums) {
         let ray = self.context.scene.camera.ray(raster);
         (self.half, self.sample) = (half, sample);
         self.stack.clear();
-        self.stack.push(Branch { ray, throughput: Vec3::ONE, bounces: 0, travelled: 0.0, key: 1 });
+        self.stack.push(Branch {
+            ray,
+            throughput: Vec3::ONE,
+            bounces: 0,
+            travelled: 0.0,
+            key: 1,
+            main: true,
+        });
         while let Some(branch) = self.stack.pop() {
             self.follow(branch, sums);
         }
     }
 
-    fn follow(&mut self, branch: Branch, sums: &mut ClassSums) {
+    fn follow(&mut self, branch: Branch, sums: &mut PixelSums) {
         let scene = self.context.scene;
         self.counts.eye_rays += 1;
         let Some(hit) = scene.geometry.closest_hit(&branch.ray) else {
-            sums.add(PathClass::Emitted, branch.throughput * scene.environment);
+            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * scene.environment);
             return;
         };
         match scene.material_of(hit.object) {
@@ -125,21 +134,22 @@ impl<'a> EyeWalk<'a> {
             (Some(a), Some(b)) => {
                 let weight = |o: &Outcome| (branch.throughput * o.fraction).max_element();
                 if weight(&a).min(weight(&b)) >= SPLIT_ABOVE {
-                    self.push(branch, hit, &b, 1.0);
-                    self.push(branch, hit, &a, 1.0);
+                    self.push(branch, hit, &b, 1.0, branch.main);
+                    self.push(branch, hit, &a, 1.0, false);
                     return;
                 }
                 let share = weight(&a) / (weight(&a) + weight(&b));
                 let u = self.sample.branch(branch.key).get(dimension);
                 let (outcome, probability) = if u < share { (a, share) } else { (b, 1.0 - share) };
-                self.push(branch, hit, &outcome, probability);
+                let main = branch.main && outcome.event == Event::Refraction;
+                self.push(branch, hit, &outcome, probability, main);
             }
-            (Some(only), None) | (None, Some(only)) => self.push(branch, hit, &only, 1.0),
+            (Some(only), None) | (None, Some(only)) => self.push(branch, hit, &only, 1.0, branch.main),
             (None, None) => {}
         }
     }
 
-    fn push(&mut self, branch: &Branch, hit: &Hit, outcome: &Outcome, probability: f32) {
+    fn push(&mut self, branch: &Branch, hit: &Hit, outcome: &Outcome, probability: f32, main: bool) {
         let mut throughput = branch.throughput * outcome.fraction * (outcome.radiance_scale / probability);
         let strength = throughput.max_element();
         if strength < ROULETTE_BELOW {
@@ -152,25 +162,26 @@ impl<'a> EyeWalk<'a> {
         }
         let surface = &hit.surface;
         let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
-        let way = u64::from(outcome.event == optics::Event::Refraction);
+        let way = u64::from(outcome.event == Event::Refraction);
         self.stack.push(Branch {
             ray: Ray::new(origin, outcome.direction),
             throughput,
             bounces: branch.bounces + 1,
             travelled: branch.travelled + hit.t,
             key: branch.key << 1 | way,
+            main,
         });
     }
 
     /// At a D: what it emits, the direct light and the photons.
-    fn arrive(&mut self, branch: &Branch, hit: &Hit, albedo: &Texture, sums: &mut ClassSums) {
+    fn arrive(&mut self, branch: &Branch, hit: &Hit, albedo: &Texture, sums: &mut PixelSums) {
         let scene = self.context.scene;
         let backside = branch.ray.direction.dot(hit.surface.normal) > 0.0;
         if let Some(light) = scene.objects[hit.object.index()].emitter
             && !backside
             && let Light::Quad(quad) = &scene.lights[light.index()]
         {
-            sums.add(PathClass::Emitted, branch.throughput * quad.radiance);
+            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * quad.radiance);
         }
         let albedo = albedo.eval(hit.surface.uv);
         if albedo == Vec3::ZERO {
@@ -182,15 +193,23 @@ impl<'a> EyeWalk<'a> {
         let receiver = Receiver { surface: &hit.surface, normal };
         let sample = self.sample.branch(branch.key);
         let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
-        sums.add(PathClass::Direct, weight * direct);
+        sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);
         if let Some(photons) = self.context.photons {
             let radius = (branch.travelled + hit.t) * self.kernel_spread;
             let lookup = Lookup { point: hit.surface.point, normal, sheet: hit.sheet, radius };
             self.counts.lookups += 1;
-            let caustic = photons.maps[self.half].irradiance(&lookup).value;
+            let mut caustic = photons.maps[self.half].irradiance(&lookup).value;
             if caustic != Vec3::ZERO {
-                let mass = scene.geometry.kernel_mass(hit.sheet, hit.surface.point, radius);
-                sums.add(PathClass::Caustic, weight * caustic / mass);
+                caustic /= scene.geometry.kernel_mass(hit.sheet, hit.surface.point, radius);
+            }
+            sums.halves[self.half].classes.add(PathClass::Caustic, weight * caustic);
+            if branch.main {
+                let half = &mut sums.halves[self.half];
+                half.irradiance += caustic;
+                half.arrivals += 1.0;
+                let surface = &hit.surface;
+                let sheet = Guide::sheet_code(hit.sheet);
+                sums.guide.add(&Guide { gain: weight, position: surface.point, normal, sheet });
             }
         }
     }

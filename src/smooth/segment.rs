@@ -1,0 +1,86 @@
+//! Segments: connected pixels whose eye rays reach one smooth piece of the same surface.
+
+use crate::film::{Film, Guide};
+
+/// Connected pixels of one smooth surface, and the box around them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Segment {
+    /// Indices of its pixels in the picture, ascending.
+    pub(super) pixels: Vec<u32>,
+    /// Left and top of the box.
+    pub(super) origin: (usize, usize),
+    /// Size of the box.
+    pub(super) size: (usize, usize),
+    /// Pixels across the whole picture.
+    stride: usize,
+}
+
+impl Segment {
+    /// A pixel's index within the box.
+    pub(super) fn local(&self, pixel: u32) -> usize {
+        let (x, y) = (pixel as usize % self.stride, pixel as usize / self.stride);
+        (y - self.origin.1) * self.size.0 + x - self.origin.0
+    }
+
+    fn of(mut pixels: Vec<u32>, stride: usize) -> Self {
+        pixels.sort_unstable();
+        let (mut low, mut high) = ((usize::MAX, usize::MAX), (0, 0));
+        for &pixel in &pixels {
+            let (x, y) = (pixel as usize % stride, pixel as usize / stride);
+            low = (low.0.min(x), low.1.min(y));
+            high = (high.0.max(x), high.1.max(y));
+        }
+        Self { pixels, origin: low, size: (high.0 - low.0 + 1, high.1 - low.1 + 1), stride }
+    }
+}
+
+/// Neighbours whose normals differ by more than this are on different faces (cosine of 18°).
+const SAME_FACE: f32 = 0.95;
+
+/// All segments, in the order of their first pixels.
+pub(super) fn segments(film: &Film) -> Vec<Segment> {
+    let (width, height) = film.size();
+    let pixels = film.pixels();
+    let mut seen = vec![false; pixels.len()];
+    let mut segments = Vec::new();
+    let mut queue = Vec::new();
+    for start in 0..pixels.len() {
+        if seen[start] || !is_surface(&pixels[start].guide) {
+            continue;
+        }
+        seen[start] = true;
+        queue.push(start);
+        let mut members = Vec::new();
+        while let Some(i) = queue.pop() {
+            members.push(i as u32);
+            let (x, y) = (i % width, i / width);
+            let left = (x > 0).then(|| i - 1);
+            let right = (x + 1 < width).then_some(i + 1);
+            let above = (y > 0).then(|| i - width);
+            let below = (y + 1 < height).then_some(i + width);
+            for j in [left, right, above, below].into_iter().flatten() {
+                if !seen[j] && joined(&pixels[i].guide, &pixels[j].guide) {
+                    seen[j] = true;
+                    queue.push(j);
+                }
+            }
+        }
+        segments.push(Segment::of(members, width));
+    }
+    segments
+}
+
+fn is_surface(guide: &Guide) -> bool {
+    guide.sheet != 0 && guide.sheet != Guide::MIXED
+}
+
+/// True if both pixels show the same smooth piece: same sheet, similar normals, and each in the other's
+/// tangent plane up to the slope that those normals allow.
+fn joined(a: &Guide, b: &Guide) -> bool {
+    if a.sheet != b.sheet || a.normal.dot(b.normal) < SAME_FACE {
+        return false;
+    }
+    let apart = b.position - a.position;
+    let off = apart.dot(a.normal).abs().max(apart.dot(b.normal).abs());
+    off <= 0.35 * apart.length()
+}
