@@ -31,7 +31,7 @@ struct Stored {
 
 type Tree = KdTree<f32, Stored, Eytzinger, FlatVec<f32, Stored, 3, 32>, 3, 32>;
 
-/// Bytes held per photon in the tree: twelve of position and 24 of [`Stored`]; the tree's arrays keep up to
+/// Bytes held per photon in the tree: twelve of position and 24 of `Stored`; the tree's arrays keep up to
 /// half as much again in reserve.
 pub const BYTES_PER_PHOTON: u64 = 36;
 

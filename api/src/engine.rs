@@ -209,7 +209,8 @@ impl RunningRender {
 
     /// The pictures of a finished render.
     pub fn outputs(&self) -> Result<Vec<Output>, String> {
-        let image = self.render.image();
+        let picture = self.render.picture();
+        let image = picture.image();
         let mut outputs = vec![
             Output { name: "image.png".into(), bytes: self.png(&image)? },
             Output {
@@ -218,7 +219,7 @@ impl RunningRender {
             },
         ];
         for class in PathClass::ALL {
-            let bytes = self.png(&self.render.layer(class))?;
+            let bytes = self.png(&picture.layer(class))?;
             outputs.push(Output { name: format!("layers/{}.png", class.name()), bytes });
         }
         Ok(outputs)

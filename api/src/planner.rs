@@ -45,7 +45,10 @@ impl Planner {
         let work = move || {
             let scene = planner.read_now(&text)?;
             let planned = planner.pool.install(|| scene.plan());
-            over(planned.memory_bytes() as f64, planner.max_memory as f64, "/image", "bytes of memory")?;
+            let (needed, limit) = (planned.memory_bytes(), planner.max_memory);
+            if needed > limit {
+                return Err(Problem::over_limit("/image", json!(needed), json!(limit), "bytes of memory"));
+            }
             Ok(planned)
         };
         self.run(work).await
@@ -59,7 +62,10 @@ impl Planner {
             let (asked, limit) = (json!(width * height), json!(self.max_pixels));
             return Err(Problem::over_limit("/image", asked, limit, "pixels"));
         }
-        over(scene.asked_seconds.unwrap_or(0.0), self.max_seconds, "/render/stop/seconds", "seconds")?;
+        if let Some(asked) = scene.asked_seconds.filter(|&asked| asked > self.max_seconds) {
+            let (asked, limit) = (json!(asked), json!(self.max_seconds));
+            return Err(Problem::over_limit("/render/stop/seconds", asked, limit, "seconds"));
+        }
         Ok(scene)
     }
 
@@ -71,8 +77,4 @@ impl Planner {
         let _turn = self.turns.acquire().await.map_err(Problem::internal)?;
         tokio::task::spawn_blocking(work).await.map_err(Problem::internal)?
     }
-}
-
-fn over(asked: f64, limit: f64, pointer: &str, what: &str) -> Result<(), Problem> {
-    if asked > limit { Err(Problem::over_limit(pointer, json!(asked), json!(limit), what)) } else { Ok(()) }
 }

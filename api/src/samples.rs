@@ -3,6 +3,9 @@
 use include_dir::{Dir, include_dir};
 
 static SCENES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../scenes");
+/// What the scenes look like, for the web page, made by
+/// `nephroid render scenes/NAME.json --size 400x300 --error 0.001 --rounds 64 -o api/web/samples/NAME.png`.
+static PICTURES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/web/samples");
 
 /// A sample scene.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +23,12 @@ impl Sample {
         let scene: Option<serde_json::Value> = serde_json::from_str(self.text).ok();
         let title = scene.as_ref().and_then(|scene| scene["name"].as_str());
         title.unwrap_or(self.name).to_owned()
+    }
+
+    /// What it looks like, as PNG, if a picture of it was embedded.
+    #[must_use]
+    pub fn picture(&self) -> Option<&'static [u8]> {
+        PICTURES.get_file(format!("{}.png", self.name)).map(include_dir::File::contents)
     }
 }
 
@@ -50,11 +59,12 @@ mod tests {
     use crate::engine::LoadedScene;
 
     #[test]
-    fn every_sample_can_be_rendered() {
+    fn every_sample_can_be_rendered_and_has_a_picture() {
         assert!(find("glass-ball").is_some());
         for sample in all() {
             let read = LoadedScene::read(sample.text, 60.0);
             assert!(read.is_ok(), "{}: {:?}", sample.name, read.err());
+            assert!(sample.picture().is_some(), "{} has no picture in api/web/samples", sample.name);
         }
     }
 

@@ -145,6 +145,8 @@ pub struct SampleView {
     pub title: String,
     /// Where its JSON is.
     pub href: String,
+    /// Where a small picture of it is.
+    pub picture: Option<String>,
 }
 
 /// Milliseconds since 1970 as `2026-11-23T08:30:00.000Z`.

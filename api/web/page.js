@@ -3,15 +3,20 @@
 import { Nephroid } from "./nephroid.js";
 import { drawSketch } from "./sketch.js";
 import { drawErrorChart } from "./chart.js";
+import { RecentRenders, WORDS, make } from "./recent.js";
 
 const nephroid = new Nephroid();
 const $ = (id) => document.getElementById(id);
-const LIST_INTERVAL = 3000;
-const WORDS = { queued: "queued", running: "rendering", succeeded: "done", failed: "failed", cancelled: "cancelled" };
+
+const recent = new RecentRenders(nephroid, {
+  shown: () => following?.id,
+  removed: (id) => id === following?.id && showScene(),
+  failed: showProblem,
+});
 
 let following = null; // { id, stop, history }
+let chosen = null; // the sample in the editor, as long as it is not changed
 let shownUrl = null;
-let listLength = 8;
 
 start();
 
@@ -20,16 +25,14 @@ async function start() {
   $("plan").addEventListener("click", showPlan);
   $("cancel").addEventListener("click", () => following && nephroid.cancel(following.id).then(showJob, showProblem));
   $("reuse").addEventListener("click", reuseScene);
-  $("more").addEventListener("click", () => ((listLength += 16), refreshJobs()));
   $("scene").addEventListener("input", sceneEdited);
   $("scene").addEventListener("scroll", () => ($("gutter").scrollTop = $("scene").scrollTop));
   $("scene").addEventListener("keydown", (event) => {
     if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) submitScene();
   });
   window.addEventListener("hashchange", followAddress);
-  document.addEventListener("visibilitychange", () => document.hidden || refreshJobs());
-  setInterval(() => document.hidden || refreshJobs(), LIST_INTERVAL);
-  await Promise.all([loadSamples(), refreshJobs()]).catch(showProblem);
+  recent.start();
+  await loadSamples().catch(showProblem);
   followAddress();
 }
 
@@ -42,44 +45,75 @@ async function loadSamples() {
   const first = Math.max(0, samples.findIndex((sample) => sample.name === "glass-ball"));
   if (!samples.length || $("scene").value) return;
   $("samples").querySelectorAll("input")[first].checked = true;
-  setScene(texts[first]);
+  chooseSample(samples[first], texts[first]);
 }
 
 function card(sample, text) {
   const label = make("label", "card");
   const input = Object.assign(make("input"), { type: "radio", name: "sample", value: sample.name });
-  input.addEventListener("change", () => (setScene(text), showSketch()));
+  input.addEventListener("change", () => chooseSample(sample, text));
+  label.append(input, sample.picture ? pictureOf(sample) : sketchOf(text), make("span", "card-title", sample.title));
+  return label;
+}
+
+function pictureOf(sample) {
+  return Object.assign(make("img"), { src: sample.picture, alt: "", width: 400, height: 300 });
+}
+
+function sketchOf(text) {
   const sketch = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   sketch.setAttribute("aria-hidden", "true");
   drawSketch(sketch, parsed(text));
-  label.append(input, sketch, make("span", "card-title", sample.title));
-  return label;
+  return sketch;
+}
+
+function chooseSample(sample, text) {
+  setScene(text);
+  chosen = sample;
+  showScene();
 }
 
 function setScene(text) {
   $("scene").value = text;
   $("scene").scrollTop = 0;
   $("edited").hidden = true;
+  chosen = null;
   clearProblem();
   numberLines();
-  redraw();
 }
 
 let redrawing;
 function sceneEdited() {
   $("edited").hidden = false;
+  chosen = null;
   clearProblem();
   numberLines();
   clearTimeout(redrawing);
-  redrawing = setTimeout(redraw, 150);
+  redrawing = setTimeout(() => following || showScene(), 150);
 }
 
-function redraw() {
+/** What the frame shows while no job is followed: the sample's picture, or the outline of what is edited. */
+function showScene() {
+  if (location.hash) history.replaceState(null, "", location.pathname);
+  following?.stop.abort();
+  following = null;
+  for (const id of ["layers", "progress", "cancel", "reuse", "download", "download-exr", "plan-box"]) $(id).hidden = true;
+  drawErrorChart($("chart"), []);
+  for (const id of ["rounds", "error", "time"]) $(id).textContent = "–";
   const scene = parsed($("scene").value);
-  if (scene && drawSketch($("sketch"), scene) && !following) {
-    $("size").textContent = `${scene.image?.width ?? 640} × ${scene.image?.height ?? 480}`;
-    shapeFrame(scene.image?.width ?? 640, scene.image?.height ?? 480);
+  if (scene) {
+    const { width = 640, height = 480 } = scene.image ?? {};
+    $("size").textContent = `${width} × ${height}`;
+    shapeFrame(width, height);
+    drawSketch($("sketch"), scene);
   }
+  const picture = chosen?.picture ?? null;
+  show(picture, picture ? `What ${chosen.title} looks like` : "");
+  setState("sketch", picture ? "sample" : "outline");
+  const hidden = JSON.stringify(scene?.objects ?? []).includes('"asset"') ? " Meshes from files are not outlined." : "";
+  $("said").textContent = picture
+    ? "This sample as it looks when it is done. “Render” makes your own."
+    : `Outline through the scene's camera.${hidden} “Render” makes the picture.`;
 }
 
 function parsed(text) {
@@ -107,7 +141,7 @@ async function submitScene() {
     const job = await nephroid.submit($("scene").value);
     location.hash = job.id;
     if (matchMedia("(max-width: 60rem)").matches) $("picture-title").scrollIntoView({ block: "start" });
-    refreshJobs();
+    recent.refresh();
   } catch (error) {
     showProblem(error);
   } finally {
@@ -191,7 +225,7 @@ function followAddress() {
   const id = location.hash.slice(1);
   following?.stop.abort();
   following = null;
-  if (!/^[0-9a-f-]{36}$/.test(id)) return showSketch();
+  if (!/^[0-9a-f-]{36}$/.test(id)) return showScene();
   following = { id, stop: new AbortController(), history: [] };
   show(null);
   follow(following).catch((error) => error.name === "AbortError" || lostJob(error));
@@ -200,6 +234,7 @@ function followAddress() {
 async function follow(current) {
   const { id, stop, history } = current;
   let seen = 0;
+  let state = "";
   for await (const job of nephroid.follow(id, { signal: stop.signal, interval: 400 })) {
     if (current !== following) return;
     const last = history.at(-1)?.rounds ?? 0;
@@ -207,31 +242,20 @@ async function follow(current) {
       history.push({ rounds: job.rounds, error: job.error_estimate });
     }
     showJob(job);
-    if (job.state === "running" && job.rounds > seen) {
+    if (job.state !== state) recent.refresh();
+    state = job.state;
+    if (state === "running" && job.rounds > seen) {
       seen = job.rounds;
       const blob = await nephroid.preview(id, { signal: stop.signal });
       if (blob && current === following) await show(URL.createObjectURL(blob), "The picture so far");
     }
   }
-  refreshJobs();
 }
 
 function lostJob(error) {
   following = null;
-  showSketch();
+  showScene();
   showProblem(error);
-}
-
-function showSketch() {
-  if (location.hash) history.replaceState(null, "", location.pathname);
-  following?.stop.abort();
-  following = null;
-  show(null);
-  for (const id of ["layers", "progress", "cancel", "reuse", "download", "download-exr", "chart", "plan-box"]) $(id).hidden = true;
-  for (const id of ["rounds", "error", "time"]) $(id).textContent = "–";
-  setState("sketch", "sketch");
-  $("said").textContent = "Outline through the scene's camera. The picture comes with “Render”.";
-  redraw();
 }
 
 function showJob(job) {
@@ -264,7 +288,7 @@ function sentence(job) {
     case "failed":
       return `Failed: ${job.error?.detail ?? "no reason is known"}`;
     default:
-      return "Cancelled. Nothing is kept of it.";
+      return "Cancelled. What you may see of it here is not kept.";
   }
 }
 
@@ -341,64 +365,7 @@ function fillPlan(plan) {
   $("plan-box").hidden = false;
 }
 
-// ---- recent renders
-
-async function refreshJobs() {
-  let page;
-  try {
-    page = await nephroid.list({ limit: Math.min(listLength, 100) });
-  } catch {
-    return; // the next turn tries again
-  }
-  $("no-jobs").hidden = page.renders.length > 0;
-  $("more").hidden = !page.next_cursor || listLength >= 100;
-  const known = new Map([...$("jobs").children].map((item) => [item.dataset.id, item]));
-  $("jobs").replaceChildren(...page.renders.map((job) => jobItem(job, known.get(job.id))));
-}
-
-function jobItem(job, known) {
-  const version = JSON.stringify([job.state, Math.round(job.progress * 100), job.id === following?.id]);
-  if (known?.dataset.version === version) return known;
-  const item = make("li");
-  Object.assign(item.dataset, { id: job.id, version });
-  const link = Object.assign(make("a"), { href: `#${job.id}` });
-  if (job.id === following?.id) link.setAttribute("aria-current", "true");
-  const picture = make("span", "thumb");
-  if (job.links.image) {
-    picture.append(Object.assign(make("img"), { src: job.links.image, alt: "", loading: "lazy" }));
-  }
-  const words = make("span", "job-words");
-  const progress = job.state === "running" ? ` ${Math.round(job.progress * 100)} %` : "";
-  words.append(make("span", "job-name", job.name || "unnamed scene"),
-               make("span", "quiet", `${when(job.created_at)} · ${job.width} × ${job.height}`));
-  const state = make("span", "state", WORDS[job.state] + progress);
-  state.dataset.state = job.state;
-  words.append(state);
-  link.append(picture, words);
-  item.append(link, removeButton(job));
-  return item;
-}
-
-function removeButton(job) {
-  const button = Object.assign(make("button", "remove", "×"), { type: "button" });
-  button.setAttribute("aria-label", `${job.done ? "Delete" : "Cancel and delete"} ${job.name || "unnamed scene"}`);
-  button.title = job.done ? "Delete" : "Cancel and delete";
-  button.addEventListener("click", async () => {
-    await nephroid.remove(job.id).catch(showProblem);
-    if (job.id === following?.id) showSketch();
-    refreshJobs();
-  });
-  return button;
-}
-
 // ---- words and elements
-
-function make(tag, className = "", text = "") {
-  const element = document.createElement(tag);
-  if (className) element.className = className;
-  if (text) element.textContent = text;
-  return element;
-}
 
 const percent = (fraction) => `${(100 * fraction).toPrecision(2)} %`;
 const slug = (name) => name.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "") || "render";
@@ -406,10 +373,4 @@ const slug = (name) => name.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^
 function elapsed(job) {
   const end = job.finished_at ? Date.parse(job.finished_at) : Date.now();
   return `${Math.max(0, (end - Date.parse(job.started_at)) / 1000).toFixed(1)} s`;
-}
-
-function when(time) {
-  const date = new Date(time);
-  const today = date.toDateString() === new Date().toDateString();
-  return today ? date.toLocaleTimeString() : date.toLocaleDateString();
 }

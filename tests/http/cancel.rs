@@ -74,3 +74,17 @@ async fn a_deleted_job_is_gone_with_its_files() {
     assert_eq!(server.get(&format!("/v1/renders/{id}/image.png")).await.status(), StatusCode::NOT_FOUND);
     assert!(!data.path().join("jobs").join(&id).exists());
 }
+
+#[tokio::test]
+async fn a_running_job_that_is_deleted_makes_room_and_leaves_nothing() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &["--concurrent", "1"]);
+    let first = server.submit(&endless()).await;
+    server.wait_for(&first, |job| job["rounds"].as_u64() > Some(0)).await;
+    let next = server.submit(&quick()).await;
+    let delete = server.client.delete(server.url(&format!("/v1/renders/{first}")));
+    assert_eq!(delete.send().await.unwrap().status(), StatusCode::NO_CONTENT);
+    server.wait_for_state(&next, "succeeded").await;
+    assert_eq!(server.get(&format!("/v1/renders/{first}")).await.status(), StatusCode::NOT_FOUND);
+    assert!(!data.path().join("jobs").join(&first).exists());
+}

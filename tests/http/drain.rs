@@ -33,7 +33,7 @@ async fn stopping_does_not_wait_for_the_render() {
     let data = tempfile::tempdir().unwrap();
     let server = Server::start(data.path(), &[]);
     // A round of this takes longer than the stop may.
-    let id = server.submit(&scene([3600, 2400], 1000)).await;
+    let id = server.submit(&scene([2400, 1800], 1000)).await;
     server.wait_for_state(&id, "running").await;
     let start = Instant::now();
     assert!(server.terminate().await.success());

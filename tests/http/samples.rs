@@ -30,6 +30,11 @@ async fn the_page_runs_nothing_but_its_own_files() {
         assert!(html.contains(file), "{file}");
         assert_eq!(server.get(file).await.status(), StatusCode::OK, "{file}");
     }
+    let script = server.get("/page.js").await.text().await.unwrap();
+    for line in script.lines().filter(|line| line.starts_with("import")) {
+        let file = line.split('"').nth(1).unwrap().trim_start_matches('.');
+        assert_eq!(server.get(file).await.status(), StatusCode::OK, "{file}");
+    }
     assert!(!html.contains("://"), "nothing from elsewhere");
 }
 

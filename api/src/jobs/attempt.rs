@@ -55,6 +55,7 @@ impl Chore {
         let start = Instant::now();
         if start >= self.due {
             work();
+            tracing::debug!(took = ?start.elapsed(), "housekeeping");
             self.due = Instant::now() + self.interval.max(start.elapsed() * HOUSEKEEPING_SHARE);
         }
     }
@@ -108,17 +109,22 @@ impl Attempt {
         // A checkpoint may be of a render that had just ended.
         if self.render.stop_reason().is_none() {
             match self.render.run_round(&self.live.control) {
-                Ok(()) => self.live.round_finished(self.progress()),
+                Ok(()) => {}
                 Err(RoundError::Cancelled) => return Turn::Stopped,
                 Err(RoundError::Failed { code, detail }) => {
                     return Turn::Over(Err(Failure { code: code.into(), detail }));
                 }
             }
         }
-        if self.render.stop_reason().is_some() {
+        let over = self.render.stop_reason().is_some();
+        if !over {
+            self.preview.run(|| self.live.show(self.render.picture()));
+        }
+        // After the preview: who reads of a finished round finds the picture of it.
+        self.live.round_finished(self.progress());
+        if over {
             return Turn::Over(self.conclude(files));
         }
-        self.preview.run(|| self.live.show(self.render.picture()));
         self.checkpoint.run(|| save_checkpoint(files, self.id, &self.render));
         Turn::Continue
     }

@@ -19,6 +19,9 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::broadcast;
 use tokio::time::Instant;
 
+/// Many times what a render takes to stop.
+const STOP_TIME: Duration = Duration::from_secs(5);
+
 /// Why the service could not start.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
@@ -207,7 +210,14 @@ impl Jobs {
 
     /// Cancels a job if it is not done, and forgets it.
     pub async fn delete(&self, id: JobId) -> Result<(), StoreError> {
+        let mut changes = self.registry.listen();
         self.cancel(id).await?;
+        // While it still stops, it may write into its folder.
+        while self.registry.get(id).is_some() {
+            if tokio::time::timeout(STOP_TIME, heard_of(&mut changes, id)).await.is_err() {
+                break;
+            }
+        }
         self.store.write(move |db| sql::delete(db, id)).await?;
         let files = self.files.clone();
         // What a crash leaves here is swept on the next start.

@@ -33,6 +33,7 @@ pub fn router(state: AppState) -> Router {
         .route("/v1/plans", post(plans::create_plan))
         .route("/v1/scenes", get(scenes::list_scenes))
         .route("/v1/scenes/{name}", get(scenes::get_scene))
+        .route("/v1/scenes/{name}/picture.png", get(scenes::get_scene_picture))
         .route("/healthz", get(health::live))
         .route("/readyz", get(health::ready))
         .route("/", get(page::index))

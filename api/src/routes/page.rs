@@ -8,10 +8,11 @@ use axum::response::{IntoResponse, Response};
 use sha2::{Digest, Sha256};
 
 /// Name, type and content of each file.
-const FILES: [(&str, &str, &str); 7] = [
+const FILES: [(&str, &str, &str); 8] = [
     ("index.html", "text/html; charset=utf-8", include_str!("../../web/index.html")),
     ("page.css", "text/css; charset=utf-8", include_str!("../../web/page.css")),
     ("page.js", "text/javascript; charset=utf-8", include_str!("../../web/page.js")),
+    ("recent.js", "text/javascript; charset=utf-8", include_str!("../../web/recent.js")),
     ("sketch.js", "text/javascript; charset=utf-8", include_str!("../../web/sketch.js")),
     ("chart.js", "text/javascript; charset=utf-8", include_str!("../../web/chart.js")),
     ("nephroid.js", "text/javascript; charset=utf-8", include_str!("../../web/nephroid.js")),
