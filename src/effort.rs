@@ -13,8 +13,8 @@ use crate::sampling::hash;
 pub struct Effort {
     /// Each window's block is 2^`photon_shift` times the plan's.
     pub photon_shift: u32,
-    /// Eye samples of each pixel and half beyond those that look photons up; empty means none.
-    pub extra: Vec<u8>,
+    /// Eye samples of each pixel and half; empty means one each.
+    pub samples: Vec<u8>,
 }
 
 /// What the film knows when the effort is decided.
@@ -36,11 +36,14 @@ pub struct Measured<'a> {
 /// A photon costs its rays and its place in the tree: about as much as another ray.
 const PHOTON_OVERHEAD: f32 = 2.0;
 
-/// Most eye samples of a pixel in one round beyond the first.
-const MOST_EXTRA: f32 = 31.0;
+/// Most eye samples of a pixel and half in one round.
+const MOST_SAMPLES: f32 = 32.0;
 
-/// With no photons to weigh against, this many extra samples go to a pixel on average.
-const EXTRA_ALONE: f32 = 1.0;
+/// Least, on average: so that what the first samples missed is found.
+const LEAST_SAMPLES: f32 = 0.25;
+
+/// With no photons to weigh against, this many samples go to a pixel on average.
+const SAMPLES_ALONE: f32 = 2.0;
 
 /// Blocks grow to at most this power of two of the plan's.
 pub const MOST_SHIFT: u32 = 4;
@@ -49,6 +52,13 @@ pub const MOST_SHIFT: u32 = 4;
 const WINDOW: usize = 2;
 
 impl Effort {
+    /// Eye samples of a pixel and half.
+    #[inline]
+    #[must_use]
+    pub fn samples(&self, pixel: usize) -> u32 {
+        self.samples.get(pixel).map_or(1, |&n| u32::from(n))
+    }
+
     /// Decides the next rounds' effort. `key` decides the rounding of fractions of a sample.
     #[must_use]
     pub fn decide(measured: &Measured<'_>, most_shift: u32, key: u64) -> Self {
@@ -57,8 +67,8 @@ impl Effort {
         let photons: f64 = measured.errors.iter().map(|e| f64::from(e.photons)).sum();
         let per_block = photons as f32 * measured.photon_weight / (measured.rays_per_block * PHOTON_OVERHEAD);
         if measured.rays_per_block <= 0.0 || per_block <= 0.0 {
-            let scale = if mean > 0.0 { (1.0 + EXTRA_ALONE) / mean } else { 0.0 };
-            return Self { photon_shift: 0, extra: extra(&wanted, scale, key) };
+            let scale = if mean > 0.0 { SAMPLES_ALONE / mean } else { 0.0 };
+            return Self { photon_shift: 0, samples: samples(&wanted, scale, key) };
         }
         // In the same unit: blocks wanted.
         let blocks = per_block.sqrt();
@@ -66,7 +76,7 @@ impl Effort {
         let balanced = if mean > 0.0 { (blocks / mean).log2().round() } else { most_shift };
         let photon_shift = balanced.clamp(0.0, most_shift) as u32;
         let scale = (1_u32 << photon_shift) as f32 / blocks;
-        Self { photon_shift, extra: extra(&wanted, scale, key) }
+        Self { photon_shift, samples: samples(&wanted, scale, key) }
     }
 }
 
@@ -87,11 +97,11 @@ fn wanted_samples(measured: &Measured<'_>) -> Vec<f32> {
     (0..per_sample.len()).map(|i| (around(i) / measured.rays_per_sample.max(1.0)).sqrt()).collect()
 }
 
-/// Samples beyond the first; fractions are rounded up as often as they are large.
-fn extra(wanted: &[f32], scale: f32, key: u64) -> Vec<u8> {
+/// Fractions of a sample are rounded up as often as they are large.
+fn samples(wanted: &[f32], scale: f32, key: u64) -> Vec<u8> {
     let round = |(i, w): (usize, &f32)| {
         let dither = (hash(key, i as u64) >> 40) as f32 / (1_u64 << 24) as f32;
-        (w * scale - 1.0 + dither).floor().clamp(0.0, MOST_EXTRA) as u8
+        ((w * scale).clamp(LEAST_SAMPLES, MOST_SAMPLES) + dither).floor() as u8
     };
     wanted.iter().enumerate().map(round).collect()
 }

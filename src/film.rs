@@ -1,9 +1,7 @@
 //! The film: one layer per class of paths and half, summed over rounds.
 
-use crate::geometry::SheetId;
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
-use crate::sampling::hash;
 use glam::Vec3;
 
 const CLASSES: usize = PathClass::ALL.len();
@@ -35,15 +33,13 @@ impl ClassSums {
 }
 
 /// What one half of a pixel has gathered. The emitted and direct classes are sums over eye samples; what
-/// photons bring is a sum over rounds of means, weighted by the rounds' photons.
+/// photons bring is a sum over rounds, weighted by the rounds' photons.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HalfSums {
-    /// Radiance per class.
+    /// Radiance per class; of the caustic class, what was looked up point by point.
     pub classes: ClassSums,
-    /// Irradiance that photons bring to the surface the eye sees first along its main way.
+    /// Irradiance that photons bring to the pixel's footprint.
     pub irradiance: Vec3,
-    /// How many samples reached that surface, relative to all that looked photons up.
-    pub arrivals: f32,
 }
 
 /// Means of a pixel.
@@ -51,9 +47,9 @@ pub struct HalfSums {
 pub struct PixelMeans {
     /// Radiance per class in each half.
     pub halves: [ClassSums; 2],
-    /// Irradiance of the surface on the main way, in each half.
+    /// Irradiance of the pixel's footprint, in each half.
     pub irradiance: [Vec3; 2],
-    /// Radiance of the pixel per irradiance of that surface.
+    /// Radiance of the pixel per irradiance of its footprint.
     pub gain: Vec3,
 }
 
@@ -71,72 +67,38 @@ impl PixelMeans {
     }
 }
 
-/// The surface that the eye's main way through a pixel leads to: what may be smoothed with what.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Guide {
-    /// Radiance of the pixel per irradiance of that surface, summed over halves.
-    pub gain: Vec3,
-    /// A point of it, from the first sample.
-    pub position: Vec3,
-    /// Its normal there.
-    pub normal: Vec3,
-    /// Its sheet and the way there, by [`Guide::view_code`]; 0 if no sample reached a surface.
-    pub view: u32,
-}
-
-impl Guide {
-    /// Code of a pixel whose samples differ in where or how they went.
-    pub const MIXED: u32 = u32::MAX;
-
-    /// Code of a pixel whose samples all reached this sheet by these reflections and refractions. A wall seen
-    /// through water and the same wall above it are two views.
-    #[must_use]
-    pub fn view_code(sheet: SheetId, way: u64) -> u32 {
-        let code = hash(u64::from(sheet.0), way) as u32;
-        code.clamp(1, Self::MIXED - 1)
-    }
-
-    /// Adds another sample's, or another round's.
-    pub(crate) fn add(&mut self, other: &Self) {
-        if self.view == 0 {
-            *self = *other;
-            return;
-        }
-        self.gain += other.gain;
-        if other.view != 0 && other.view != self.view {
-            self.view = Self::MIXED;
-        }
-    }
-}
-
 /// One pixel: two independent halves, each an estimate of the same radiance, W·sr⁻¹·m⁻².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelSums {
     /// Half A and half B.
     pub halves: [HalfSums; 2],
-    /// The surface behind the pixel.
-    pub guide: Guide,
+    /// Radiance per irradiance of the pixel's footprint, summed over the eye samples of both halves.
+    pub gain: Vec3,
     /// Eye samples in each half.
     pub samples: u32,
 }
 
 impl PixelSums {
-    /// Scales what photons brought: to the mean over the look-ups of a round, or by the round's weight.
-    pub(crate) fn average_lookups(&mut self, weight: f32) {
-        self.guide.gain *= weight;
+    /// Scales what was looked up point by point, to the mean over the look-ups of a round.
+    pub(crate) fn average_lookups(&mut self, factor: f32) {
+        for half in &mut self.halves {
+            half.classes.0[PathClass::Caustic as usize] *= factor;
+        }
+    }
+
+    /// Scales all that photons brought by the round's weight.
+    fn weigh_photons(&mut self, weight: f32) {
+        self.average_lookups(weight);
         for half in &mut self.halves {
             half.irradiance *= weight;
-            half.arrivals *= weight;
-            half.classes.0[PathClass::Caustic as usize] *= weight;
         }
     }
 
     fn add(&mut self, other: &Self) {
-        self.guide.add(&other.guide);
+        self.gain += other.gain;
         self.samples += other.samples;
         for (mine, theirs) in self.halves.iter_mut().zip(&other.halves) {
             mine.irradiance += theirs.irradiance;
-            mine.arrivals += theirs.arrivals;
             for (a, b) in mine.classes.0.iter_mut().zip(&theirs.classes.0) {
                 *a += *b;
             }
@@ -146,6 +108,8 @@ impl PixelSums {
     fn means(&self, photon_weight: f32) -> PixelMeans {
         let per_sample = 1.0 / self.samples.max(1) as f32;
         let per_photon = if photon_weight > 0.0 { 1.0 / photon_weight } else { 0.0 };
+        let gain = self.gain * (0.5 * per_sample);
+        let irradiance = self.halves.map(|half| half.irradiance * per_photon);
         let halves = self.halves.map(|half| {
             let mut means = half.classes;
             for class in PathClass::ALL {
@@ -154,17 +118,17 @@ impl PixelSums {
                     PathClass::Caustic => per_photon,
                 };
             }
+            means.add(PathClass::Caustic, gain * half.irradiance * per_photon);
             means
         });
-        let irradiance = self
-            .halves
-            .map(|half| if half.arrivals > 0.0 { half.irradiance / half.arrivals } else { Vec3::ZERO });
-        PixelMeans { halves, irradiance, gain: self.guide.gain * (0.5 * per_photon) }
+        PixelMeans { halves, irradiance, gain }
     }
 
     /// The class that holds a number that is not finite, if any.
     pub(crate) fn not_finite(&self) -> Option<PathClass> {
-        PathClass::ALL.into_iter().find(|&c| self.halves.iter().any(|h| !h.classes.get(c).is_finite()))
+        PathClass::ALL
+            .into_iter()
+            .find(|&c| self.halves.iter().any(|h| !(h.classes.get(c) + h.irradiance).is_finite()))
     }
 }
 
@@ -219,7 +183,7 @@ impl Film {
         self.rounds += 1;
         self.photon_weight += photon_weight;
         for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
-            pixel.average_lookups(photon_weight);
+            pixel.weigh_photons(photon_weight);
             sum.add(pixel);
         }
     }
@@ -312,12 +276,7 @@ impl PixelSums {
             half.classes.0.iter().for_each(|v| vector(*v));
             vector(half.irradiance);
         }
-        vector(self.guide.gain);
-        vector(self.guide.position);
-        vector(self.guide.normal);
-        word(self.halves[0].arrivals.to_bits());
-        word(self.halves[1].arrivals.to_bits());
-        word(self.guide.view);
+        vector(self.gain);
         word(self.samples);
     }
 
@@ -328,12 +287,7 @@ impl PixelSums {
             half.classes.0.iter_mut().for_each(|v| *v = vector());
             half.irradiance = vector();
         }
-        self.guide.gain = vector();
-        self.guide.position = vector();
-        self.guide.normal = vector();
-        self.halves[0].arrivals = f32::from_bits(word());
-        self.halves[1].arrivals = f32::from_bits(word());
-        self.guide.view = word();
+        self.gain = vector();
         self.samples = word();
     }
 }

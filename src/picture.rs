@@ -3,6 +3,7 @@
 use crate::film::{Film, PixelMeans};
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
+use crate::pass2_eye::Footprints;
 use crate::smooth::{Smoothing, smooth};
 use glam::Vec3;
 
@@ -15,8 +16,8 @@ pub struct Picture<'a> {
 impl<'a> Picture<'a> {
     /// Smooths the film's caustics.
     #[must_use]
-    pub fn new(film: &'a Film) -> Self {
-        Self { film, smoothing: smooth(film) }
+    pub fn new(film: &'a Film, footprints: &Footprints) -> Self {
+        Self { film, smoothing: smooth(film, footprints) }
     }
 
     /// All classes together.

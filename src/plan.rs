@@ -16,8 +16,6 @@ use glam::Vec3;
 pub struct Plan {
     /// Photon windows and their budgets; empty if pass 1 does not run.
     pub photons: Vec<Budget>,
-    /// Eye samples per pixel, half and round.
-    pub eye_samples: u32,
     /// Radius of the density estimate.
     pub radius: RadiusRule,
     /// Each choice with its reason.
@@ -73,7 +71,6 @@ impl Plan {
     pub fn new(scene: &Scene) -> Self {
         let mut plan = Self {
             photons: Vec::new(),
-            eye_samples: 1,
             radius: scene.render.radius,
             decisions: Vec::new(),
             warnings: Vec::new(),

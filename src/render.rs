@@ -5,7 +5,7 @@ use crate::film::Film;
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::pass1_light::{self, Blocks, Tally};
-use crate::pass2_eye::{self, EyeContext, EyeCounts};
+use crate::pass2_eye::{self, EyeContext, EyeCounts, Footprints};
 use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::sampling::hash;
@@ -177,6 +177,8 @@ pub struct Render {
     pass2: PassTime,
     windows: Vec<Tally>,
     eye: EyeCounts,
+    /// Traced before the first round that has photons.
+    footprints: Footprints,
     /// Blocks of photons used up.
     blocks: u32,
     /// Decided at the last round that [`is_milestone`].
@@ -214,6 +216,7 @@ impl Render {
             eye: EyeCounts::default(),
             error: None,
             blocks: 0,
+            footprints: Footprints::default(),
             effort: Effort::default(),
         }
     }
@@ -227,6 +230,9 @@ impl Render {
         let round = self.film.rounds();
         let start = Stopwatch::start();
         let blocks = self.next_blocks();
+        if !self.plan.photons.is_empty() && self.footprints.size().0 == 0 {
+            self.footprints = Footprints::trace(&self.scene);
+        }
         let photons = if self.plan.photons.is_empty() {
             None
         } else {
@@ -240,6 +246,7 @@ impl Render {
             plan: &self.plan,
             photons: photons.as_ref(),
             round,
+            footprints: &self.footprints,
             film: &self.film,
             effort: &self.effort,
         };
@@ -267,7 +274,7 @@ impl Render {
         if !is_milestone(self.rounds()) {
             return;
         }
-        let picture = Picture::new(&self.film);
+        let picture = Picture::new(&self.film, &self.footprints);
         let errors = picture.errors();
         let samples: Vec<u32> = self.film.pixels().iter().map(|p| p.samples).collect();
         let sampled: u64 = samples.iter().map(|&n| 2 * u64::from(n)).sum();
@@ -348,7 +355,7 @@ impl Render {
     /// The smoothed picture so far, from which image and layers can be had without smoothing again.
     #[must_use]
     pub fn picture(&self) -> Picture<'_> {
-        Picture::new(&self.film)
+        Picture::new(&self.film, &self.footprints)
     }
 
     /// One class of paths so far; the layers add up to the picture.

@@ -13,6 +13,7 @@ mod ladder;
 mod segment;
 
 use crate::film::{Film, PixelMeans};
+use crate::pass2_eye::Footprints;
 use glam::Vec3;
 use ladder::Ladder;
 use rayon::prelude::*;
@@ -44,14 +45,14 @@ struct Sample {
 
 /// Decides the widths and filters; `None` if the film holds no photons.
 #[must_use]
-pub fn smooth(film: &Film) -> Option<Smoothing> {
+pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
     let samples: Vec<Sample> = film.means().map(|means| Sample::of(&means)).collect();
     if samples.iter().all(|s| s.irradiance == [Vec3::ZERO; 2]) {
         return None;
     }
     let sum: f32 = film.means().map(|means| mean_channel(means.total())).sum();
     let mean = sum / samples.len() as f32;
-    let filtered: Vec<(Segment, Ladder)> = segment::segments(film)
+    let filtered: Vec<(Segment, Ladder)> = segment::segments(footprints)
         .into_par_iter()
         .filter(|s| s.pixels.len() >= LEAST_PIXELS)
         .filter(|s| s.pixels.iter().any(|&i| samples[i as usize].irradiance != [Vec3::ZERO; 2]))

@@ -7,11 +7,11 @@
 
 use super::EyeContext;
 use super::direct::{Receiver, direct_light};
-use crate::film::{Guide, PixelSums};
+use super::footprint::view_code;
+use crate::film::PixelSums;
 use crate::geometry::{Hit, Ray, offset_origin};
 use crate::light_path::PathClass;
 use crate::optics::{self, Event, Interaction, Outcome};
-use crate::pass1_light::RoundPhotons;
 use crate::photon_map::Lookup;
 use crate::sampling::SamplePoint;
 use crate::scene::{Light, Material, Texture};
@@ -52,6 +52,17 @@ impl EyeCounts {
     }
 }
 
+/// Where an eye sample looks photons up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lookups {
+    /// Nowhere.
+    Nowhere,
+    /// At every D that is not the pixel's footprint.
+    OffFootprint,
+    /// At every D.
+    Everywhere,
+}
+
 /// Follows eye rays; owns the stack of branches yet to follow.
 pub(super) struct EyeWalk<'a> {
     context: &'a EyeContext<'a>,
@@ -61,7 +72,8 @@ pub(super) struct EyeWalk<'a> {
     /// The eye sample that is being followed.
     half: usize,
     sample: SamplePoint,
-    photons: Option<&'a RoundPhotons>,
+    lookups: Lookups,
+    view: Option<u32>,
     pub(super) counts: EyeCounts,
 }
 
@@ -90,15 +102,16 @@ impl<'a> EyeWalk<'a> {
             stack: Vec::new(),
             half: 0,
             sample,
-            photons: None,
+            lookups: Lookups::Nowhere,
+            view: None,
             counts: EyeCounts::default(),
         }
     }
 
-    /// Sets the sample that is followed next, and whether it looks photons up.
-    pub(super) fn start(&mut self, half: usize, sample: SamplePoint, gathers: bool) {
+    /// Sets the sample that is followed next, where it looks photons up, and the view of the pixel's footprint.
+    pub(super) fn start(&mut self, half: usize, sample: SamplePoint, lookups: Lookups, view: Option<u32>) {
         (self.half, self.sample) = (half, sample);
-        self.photons = if gathers { self.context.photons } else { None };
+        (self.lookups, self.view) = (lookups, view);
     }
 
     /// Adds what arrives along one eye ray to the classes' sums.
@@ -177,13 +190,12 @@ impl<'a> EyeWalk<'a> {
         }
         let surface = &hit.surface;
         let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
-        let way = u64::from(outcome.event == Event::Refraction);
         self.stack.push(Branch {
             ray: Ray::new(origin, outcome.direction),
             throughput,
             bounces: branch.bounces + 1,
             travelled: branch.travelled + hit.t,
-            key: branch.key << 1 | way,
+            key: outcome.extend_key(branch.key),
             main,
         });
     }
@@ -209,23 +221,31 @@ impl<'a> EyeWalk<'a> {
         let sample = self.sample.branch(branch.key);
         let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
         sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);
-        if let Some(photons) = self.photons {
-            let radius = (branch.travelled + hit.t) * self.kernel_spread;
-            let lookup = Lookup { point: hit.surface.point, normal, sheet: hit.sheet, radius };
-            self.counts.lookups += 1;
-            let mut caustic = photons.maps[self.half].irradiance(&lookup).value;
-            if caustic != Vec3::ZERO {
-                caustic /= scene.geometry.kernel_mass(hit.sheet, hit.surface.point, radius);
-            }
-            sums.halves[self.half].classes.add(PathClass::Caustic, weight * caustic);
-            if branch.main {
-                let half = &mut sums.halves[self.half];
-                half.irradiance += caustic;
-                half.arrivals += 1.0;
-                let surface = &hit.surface;
-                let view = Guide::view_code(hit.sheet, branch.key);
-                sums.guide.add(&Guide { gain: weight, position: surface.point, normal, view });
+        let footprint = branch.main && self.view == Some(view_code(hit.sheet, branch.key));
+        if footprint {
+            sums.gain += weight;
+        }
+        match self.lookups {
+            Lookups::Nowhere => {}
+            Lookups::OffFootprint if footprint => {}
+            Lookups::OffFootprint | Lookups::Everywhere => {
+                let caustic = self.look_up(branch, hit, normal);
+                sums.halves[self.half].classes.add(PathClass::Caustic, weight * caustic);
             }
         }
+    }
+
+    /// Irradiance by density estimation around the point, with a kernel of about a pixel.
+    fn look_up(&mut self, branch: &Branch, hit: &Hit, normal: Vec3) -> Vec3 {
+        let Some(photons) = self.context.photons else { return Vec3::ZERO };
+        let radius = (branch.travelled + hit.t) * self.kernel_spread;
+        let point = hit.surface.point;
+        let lookup = Lookup { point, normal, sheet: hit.sheet, radius };
+        self.counts.lookups += 1;
+        let irradiance = photons.maps[self.half].irradiance(&lookup).value;
+        if irradiance == Vec3::ZERO {
+            return irradiance;
+        }
+        irradiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius)
     }
 }

@@ -39,10 +39,10 @@ impl Render {
         for tally in &self.windows {
             put_tally(&mut out, tally);
         }
-        for count in [self.blocks, self.effort.photon_shift, self.effort.extra.len() as u32] {
+        for count in [self.blocks, self.effort.photon_shift, self.effort.samples.len() as u32] {
             out.extend(count.to_le_bytes());
         }
-        out.extend(&self.effort.extra);
+        out.extend(&self.effort.samples);
         // A non-negative float's bits plus one: zero means none.
         let error = self.error.map_or(0, |e| e.to_bits() + 1);
         out.extend(error.to_le_bytes());
@@ -81,9 +81,9 @@ impl Render {
         let image = self.scene.image;
         self.blocks = take_u32(&mut bytes)?;
         self.effort.photon_shift = take_u32(&mut bytes)?.min(self.plan.most_photon_shift());
-        let extra = take_u32(&mut bytes)? as usize;
-        let (counts, rest) = bytes.split_at_checked(extra)?;
-        self.effort.extra = counts.to_vec();
+        let pixels = take_u32(&mut bytes)? as usize;
+        let (counts, rest) = bytes.split_at_checked(pixels)?;
+        self.effort.samples = counts.to_vec();
         bytes = rest;
         self.error = take_u32(&mut bytes)?.checked_sub(1).map(f32::from_bits);
         self.film = Film::from_bytes(image.width, image.height, bytes)?;

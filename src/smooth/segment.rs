@@ -1,6 +1,6 @@
 //! Segments: connected pixels whose eye rays reach one smooth piece of the same surface.
 
-use crate::film::{Film, Guide};
+use crate::pass2_eye::{Footprint, Footprints};
 
 /// Connected pixels of one smooth surface, and the box around them.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,28 +38,28 @@ impl Segment {
 const SAME_FACE: f32 = 0.95;
 
 /// All segments, in the order of their first pixels.
-pub(super) fn segments(film: &Film) -> Vec<Segment> {
-    let (width, height) = film.size();
-    let pixels = film.pixels();
-    let mut seen = vec![false; pixels.len()];
+pub(super) fn segments(footprints: &Footprints) -> Vec<Segment> {
+    let (count, width) = footprints.size();
+    let mut seen = vec![false; count];
     let mut segments = Vec::new();
     let mut queue = Vec::new();
-    for start in 0..pixels.len() {
-        if seen[start] || !is_surface(&pixels[start].guide) {
+    for start in 0..count {
+        if seen[start] || footprints.get(start).is_none() {
             continue;
         }
         seen[start] = true;
         queue.push(start);
         let mut members = Vec::new();
         while let Some(i) = queue.pop() {
+            let Some(here) = footprints.get(i) else { continue };
             members.push(i as u32);
-            let (x, y) = (i % width, i / width);
+            let x = i % width;
             let left = (x > 0).then(|| i - 1);
             let right = (x + 1 < width).then_some(i + 1);
-            let above = (y > 0).then(|| i - width);
-            let below = (y + 1 < height).then_some(i + width);
+            let above = i.checked_sub(width);
+            let below = (i + width < count).then_some(i + width);
             for j in [left, right, above, below].into_iter().flatten() {
-                if !seen[j] && joined(&pixels[i].guide, &pixels[j].guide) {
+                if !seen[j] && footprints.get(j).is_some_and(|there| joined(here, there)) {
                     seen[j] = true;
                     queue.push(j);
                 }
@@ -70,17 +70,13 @@ pub(super) fn segments(film: &Film) -> Vec<Segment> {
     segments
 }
 
-fn is_surface(guide: &Guide) -> bool {
-    guide.view != 0 && guide.view != Guide::MIXED
-}
-
 /// True if both pixels show the same smooth piece: same view, similar normals, and each in the other's
 /// tangent plane up to the slope that those normals allow.
-fn joined(a: &Guide, b: &Guide) -> bool {
+fn joined(a: &Footprint, b: &Footprint) -> bool {
     if a.view != b.view || a.normal.dot(b.normal) < SAME_FACE {
         return false;
     }
-    let apart = b.position - a.position;
+    let apart = b.center() - a.center();
     let off = apart.dot(a.normal).abs().max(apart.dot(b.normal).abs());
     off <= 0.35 * apart.length()
 }
