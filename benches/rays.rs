@@ -14,7 +14,7 @@ use obvhs::ray::{Ray as ObvhsRay, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 use std::hint::black_box;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Pixels across and down.
 const SIDE: u16 = 256;
@@ -39,7 +39,9 @@ fn rays(criterion: &mut Criterion) {
 fn bench_mesh(criterion: &mut Criterion, name: &str, mesh: &MeshData) {
     let mut builder = GeometryBuilder::default();
     builder.mesh(ObjectId(0), mesh);
+    let start = Instant::now();
     let geometry = builder.build();
+    eprintln!("{name}: built in {:?}", start.elapsed());
     let other = Cwbvh::new(mesh);
     let rays = RaySet::new(&geometry);
     eprintln!(

@@ -1,6 +1,8 @@
 //! What the leaves of a structure hold: packets of triangles, and runs of other primitives.
 
+use super::Bounds;
 use super::mesh::Mesh;
+use super::nearest::Place;
 use super::packet::{Packet, Triangle};
 use arrayvec::ArrayVec;
 
@@ -126,6 +128,23 @@ impl Leaves {
         let (triangles, others): (Vec<u32>, Vec<u32>) = all.partition(|&n| primitives.is_triangle(n));
         let chunks = triangles.chunks(8).chain(others.chunks(MAX_RUN));
         chunks.map(|numbers| self.add(numbers, primitives)).collect()
+    }
+
+    /// Every primitive's place and box; `bounds` are in the order of their numbers.
+    pub(super) fn placed(&self, bounds: &[Bounds]) -> Vec<(Place, Bounds)> {
+        let triangles = self.packets.iter().flat_map(Packet::primitives);
+        // Lanes that hold no triangle have a number that does not exist.
+        let triangles = triangles.enumerate().map(|(slot, n)| (Place::Triangle(slot as u32), n));
+        let entries = self.entries.iter().enumerate().map(|(i, e)| (Place::Entry(i as u32), e.primitive));
+        triangles
+            .chain(entries)
+            .filter_map(|(place, number)| Some((place, *bounds.get(number as usize)?)))
+            .collect()
+    }
+
+    /// The number of the triangle in a slot.
+    pub(super) fn number(&self, slot: u32) -> u32 {
+        self.packets[slot as usize / 8].primitives()[slot as usize % 8]
     }
 
     /// The triangle in a slot.

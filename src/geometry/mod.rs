@@ -2,7 +2,9 @@
 
 mod accel;
 mod bounds;
+mod builder;
 mod bvh;
+mod grid;
 mod leaves;
 mod mesh;
 mod nearest;
@@ -11,8 +13,11 @@ mod polygon;
 mod ray;
 mod simd;
 mod sphere;
+mod sphere_tree;
 
+pub use accel::Structure;
 pub use bounds::Bounds;
+pub use builder::GeometryBuilder;
 pub use mesh::MeshData;
 pub use polygon::PolygonError;
 pub use ray::{Ray, offset_origin};
@@ -21,12 +26,17 @@ pub use sphere::roots as sphere_roots;
 use crate::scene::ObjectId;
 use accel::Accel;
 use glam::{Vec2, Vec3};
-use leaves::{Child, Entry, Leaves, Primitives, Run, Shape, Source, Word};
+use leaves::{Child, Entry, Leaves, Run, Shape, Word};
 use mesh::Mesh;
 use nearest::{Nearest, Place};
 use packet::ShearedRay;
 use polygon::{Edge, Polygon};
 use sphere::Sphere;
+
+/// How far computed hits may lie off their primitive, as a multiple of the rounding of the largest coordinate
+/// in the frame of the ray: three for the corners' place across the ray, nine for the distance along it, and
+/// some more for the box test itself. Boxes are grown by this much, so none that holds a hit is missed.
+const HIT_ROUNDING: f32 = 16.0 * f32::EPSILON;
 
 /// All primitives of a scene and the structure over them.
 #[derive(Debug)]
@@ -44,6 +54,8 @@ pub struct Geometry {
     /// Box of each object; empty for an object without primitives.
     object_bounds: Vec<Bounds>,
     accel: Accel,
+    /// The structure that was asked for.
+    asked: Structure,
 }
 
 /// Primitives with successive numbers that belong to one object; triangles also to one mesh.
@@ -108,6 +120,14 @@ impl Geometry {
         let nearest = match &self.accel {
             Accel::List(words) => self.closest_of_list(words, ray),
             Accel::Bvh(bvh) => bvh.closest(&self.leaves, ray, others),
+            Accel::Grid(grid) => {
+                let sheared = ShearedRay::new(ray);
+                grid.closest(ray, |place, nearest| self.closest_of_place(place, ray, &sheared, nearest))
+            }
+            Accel::Spheres(tree) => {
+                let sheared = ShearedRay::new(ray);
+                tree.closest(ray, |place, nearest| self.closest_of_place(place, ray, &sheared, nearest))
+            }
         };
         let place = nearest.place?;
         let owner = self.owner(nearest.primitive);
@@ -134,6 +154,31 @@ impl Geometry {
         match &self.accel {
             Accel::List(words) => self.any_of_list(words, ray, t_max),
             Accel::Bvh(bvh) => bvh.any(&self.leaves, ray, t_max, others),
+            Accel::Grid(grid) => {
+                let sheared = ShearedRay::new(ray);
+                grid.any(ray, t_max, |place| self.place_meets(place, ray, &sheared, t_max).is_some())
+            }
+            Accel::Spheres(tree) => {
+                let sheared = ShearedRay::new(ray);
+                tree.any(ray, t_max, |place| self.place_meets(place, ray, &sheared, t_max).is_some())
+            }
+        }
+    }
+
+    fn closest_of_place(&self, place: Place, ray: &Ray, sheared: &ShearedRay, nearest: &mut Nearest) {
+        if let Some(t) = self.place_meets(place, ray, sheared, nearest.limit()) {
+            let primitive = match place {
+                Place::Triangle(slot) => self.leaves.number(slot),
+                Place::Entry(entry) => self.leaves.entries[entry as usize].primitive,
+            };
+            nearest.offer(t, primitive, place);
+        }
+    }
+
+    fn place_meets(&self, place: Place, ray: &Ray, sheared: &ShearedRay, t_max: f32) -> Option<f32> {
+        match place {
+            Place::Triangle(slot) => self.leaves.triangle(slot).intersect(sheared, t_max).map(|(t, _)| t),
+            Place::Entry(entry) => self.meets(&self.leaves.entries[entry as usize], ray, t_max),
         }
     }
 
@@ -251,6 +296,12 @@ impl Geometry {
         self.accel.name()
     }
 
+    /// Why this structure, or what came of it.
+    #[must_use]
+    pub fn structure_reason(&self) -> String {
+        self.accel.reason(self.asked, self.count)
+    }
+
     /// Bytes held by the primitives and the structure.
     #[must_use]
     pub fn memory_bytes(&self) -> u64 {
@@ -260,91 +311,5 @@ impl Geometry {
             + size_of_val(&self.owners[..])
             + self.meshes.iter().map(Mesh::memory_bytes).sum::<usize>();
         (arrays + self.leaves.memory_bytes() + self.accel.memory_bytes()) as u64
-    }
-}
-
-/// Collects primitives; [`GeometryBuilder::build`] makes the structure over them.
-#[derive(Debug, Default)]
-pub struct GeometryBuilder {
-    spheres: Vec<Sphere>,
-    polygons: Vec<Polygon>,
-    edges: Vec<Edge>,
-    primitives: Primitives,
-    owners: Vec<Owner>,
-}
-
-impl GeometryBuilder {
-    /// Adds a sphere. The radius is positive.
-    pub fn sphere(&mut self, object: ObjectId, center: Vec3, radius: f32) {
-        let shape = Shape::Sphere(self.spheres.len() as u32);
-        self.spheres.push(Sphere { center, radius });
-        self.other(object, shape);
-    }
-
-    /// Adds a planar polygon: an outline and the outlines of its holes, by the even-odd rule.
-    ///
-    /// # Errors
-    /// See [`PolygonError`]; nothing is added then.
-    pub fn polygon(&mut self, object: ObjectId, outlines: &[Vec<Vec3>]) -> Result<(), PolygonError> {
-        let polygon = Polygon::new(outlines, &mut self.edges)?;
-        let shape = Shape::Polygon(self.polygons.len() as u32);
-        self.polygons.push(polygon);
-        self.other(object, shape);
-        Ok(())
-    }
-
-    /// Adds a triangle mesh. Indices are in range.
-    pub fn mesh(&mut self, object: ObjectId, mesh: &MeshData) {
-        let index = self.primitives.meshes.len() as u32;
-        let first = self.primitives.sources.len() as u32;
-        self.owners.push(Owner { first, object, mesh: Some(index) });
-        let triangles = 0..mesh.triangles.len() as u32;
-        self.primitives.sources.extend(triangles.map(|i| Source::Triangle { mesh: index, index: i }));
-        self.primitives.meshes.push(Mesh::new(mesh));
-    }
-
-    fn other(&mut self, object: ObjectId, shape: Shape) {
-        let owner = Owner { first: self.primitives.sources.len() as u32, object, mesh: None };
-        if self.owners.last().is_none_or(|last| (last.object, last.mesh) != (object, None)) {
-            self.owners.push(owner);
-        }
-        self.primitives.sources.push(Source::Other(shape));
-    }
-
-    /// Builds the structure over all primitives.
-    #[must_use]
-    pub fn build(mut self) -> Geometry {
-        let sources = &self.primitives.sources;
-        let bounds: Vec<Bounds> = sources.iter().map(|source| self.bounds_of(*source)).collect();
-        let objects = self.owners.iter().map(|owner| owner.object.index() + 1).max().unwrap_or(0);
-        let mut object_bounds = vec![Bounds::EMPTY; objects];
-        let ends = self.owners.iter().skip(1).map(|next| next.first as usize).chain([sources.len()]);
-        for (owner, end) in self.owners.iter().zip(ends) {
-            let whole = &mut object_bounds[owner.object.index()];
-            *whole = bounds[owner.first as usize..end].iter().fold(*whole, |a, b| a.union(*b));
-        }
-        let (accel, leaves) = Accel::build(&bounds, &self.primitives);
-        self.primitives.meshes.iter_mut().for_each(Mesh::settle);
-        Geometry {
-            spheres: self.spheres,
-            polygons: self.polygons,
-            edges: self.edges,
-            meshes: self.primitives.meshes,
-            leaves,
-            owners: self.owners,
-            count: self.primitives.sources.len(),
-            object_bounds,
-            accel,
-        }
-    }
-
-    fn bounds_of(&self, source: Source) -> Bounds {
-        match source {
-            Source::Triangle { mesh, index } => {
-                self.primitives.meshes[mesh as usize].triangle(index).bounds()
-            }
-            Source::Other(Shape::Sphere(i)) => self.spheres[i as usize].bounds(),
-            Source::Other(Shape::Polygon(i)) => self.polygons[i as usize].bounds(),
-        }
     }
 }

@@ -186,6 +186,11 @@ impl Packet {
         packet
     }
 
+    /// The number in each lane.
+    pub(super) fn primitives(&self) -> [u32; 8] {
+        self.primitives
+    }
+
     #[inline]
     pub(super) fn triangle(&self, lane: usize) -> Triangle {
         Triangle(std::array::from_fn(|k| Vec3::from(self.corners[k].map(|column| column[lane]))))

@@ -1,13 +1,10 @@
-//! Builds the hierarchy: `obvhs` makes a binary tree, which is cut into nodes of eight children where that is
-//! cheapest by the surface area heuristic.
+//! Builds the hierarchy: a binary tree is cut into nodes of eight children where that is cheapest by the surface
+//! area heuristic.
 
 use super::super::Bounds;
 use super::super::leaves::{Leaves, MAX_RUN, Primitives, Word};
+use super::binary::BinaryTree;
 use super::{Bvh, MAX_DEPTH, Node};
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, builder::build_bvh2};
-use obvhs::{Boundable, BvhBuildParams};
-use std::time::Duration;
 
 /// Cost of testing eight boxes, where a packet of triangles costs 1 (measured).
 const NODE_COST: f32 = 1.2;
@@ -16,12 +13,6 @@ const OTHER_COST: f32 = 0.7;
 /// From this depth on the tree is cut by the primitives' order instead, which is at most 11 levels deep: equal
 /// or nested primitives can make the binary tree as deep as they are many.
 const SPLIT_DEPTH: usize = MAX_DEPTH - 12;
-
-impl Boundable for Bounds {
-    fn aabb(&self) -> Aabb {
-        Aabb::new(self.min.into(), self.max.into())
-    }
-}
 
 impl Bvh {
     /// Builds the hierarchy and puts the primitives into `leaves` in its order.
@@ -34,9 +25,7 @@ impl Bvh {
         if bounds.is_empty() {
             return bvh;
         }
-        let params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::medium_build() };
-        let mut time = Duration::ZERO;
-        let binary = build_bvh2(bounds, params, &mut time);
+        let binary = BinaryTree::build(bounds);
         let costs = Costs::new(&binary, primitives);
         let mut collapse = Collapse { binary, costs, bounds, primitives, leaves, nodes: Vec::new() };
         bvh.root = Some(collapse.subtree(0, 0));
@@ -82,20 +71,19 @@ impl Content {
 }
 
 impl Costs {
-    fn new(binary: &Bvh2, primitives: &Primitives) -> Self {
+    fn new(binary: &BinaryTree, primitives: &Primitives) -> Self {
         let count = binary.nodes.len();
         let mut costs = Self { slots: vec![[0.0; 8]; count], leaf: vec![false; count] };
         let mut contents = vec![Content::default(); count];
-        for node in children_first(binary) {
-            let area = binary.nodes[node].aabb().half_area();
-            contents[node] = match children(binary, node) {
+        for (index, node) in binary.nodes.iter().enumerate().rev() {
+            contents[index] = match node.children() {
                 Some([l, r]) => contents[l].plus(contents[r]),
-                None => leaf_primitives(binary, node).iter().fold(Content::default(), |sum, &p| {
-                    let triangles = u8::from(primitives.is_triangle(p));
-                    sum.plus(Content { triangles, others: 1 - triangles })
-                }),
+                None => {
+                    let triangles = u8::from(primitives.is_triangle(binary.order[node.first as usize]));
+                    Content { triangles, others: 1 - triangles }
+                }
             };
-            costs.fill(node, children(binary, node), area, contents[node].leaf_cost());
+            costs.fill(index, node.children(), node.bounds.half_area(), contents[index].leaf_cost());
         }
         costs
     }
@@ -125,30 +113,8 @@ impl Costs {
     }
 }
 
-fn children(binary: &Bvh2, node: usize) -> Option<[usize; 2]> {
-    let n = &binary.nodes[node];
-    let first = n.first_index as usize;
-    (!n.is_leaf()).then_some([first, first + 1])
-}
-
-fn leaf_primitives(binary: &Bvh2, node: usize) -> &[u32] {
-    let n = &binary.nodes[node];
-    &binary.primitive_indices[n.first_index as usize..][..n.prim_count as usize]
-}
-
-/// All nodes, each after those below it.
-fn children_first(binary: &Bvh2) -> impl Iterator<Item = usize> {
-    let mut order = Vec::with_capacity(binary.nodes.len());
-    let mut stack = vec![0];
-    while let Some(node) = stack.pop() {
-        order.push(node);
-        stack.extend(children(binary, node).into_iter().flatten());
-    }
-    order.into_iter().rev()
-}
-
 struct Collapse<'a> {
-    binary: Bvh2,
+    binary: BinaryTree,
     costs: Costs,
     bounds: &'a [Bounds],
     primitives: &'a Primitives,
@@ -157,19 +123,17 @@ struct Collapse<'a> {
 }
 
 impl Collapse<'_> {
-    fn subtree(&mut self, node: usize, depth: usize) -> Word {
-        let Some(below) = children(&self.binary, node).filter(|_| !self.costs.leaf[node]) else {
-            return self.by_order(&self.below(node));
+    fn subtree(&mut self, index: usize, depth: usize) -> Word {
+        let node = &self.binary.nodes[index];
+        let Some(below) = node.children().filter(|_| depth < SPLIT_DEPTH && !self.costs.leaf[index]) else {
+            let (first, count) = (node.first as usize, node.count as usize);
+            return self.by_order(&self.binary.order[first..first + count].to_vec());
         };
-        if depth >= SPLIT_DEPTH {
-            return self.by_order(&self.below(node));
-        }
         let mut cut = Vec::with_capacity(8);
         self.split(below, 8, &mut cut);
         let index = self.add_node();
         for (lane, child) in cut.into_iter().enumerate() {
-            let aabb = self.binary.nodes[child].aabb();
-            let bounds = Bounds::new(aabb.min.into(), aabb.max.into());
+            let bounds = self.binary.nodes[child].bounds;
             let word = self.subtree(child, depth + 1);
             self.nodes[index].set(lane, bounds, word);
         }
@@ -187,23 +151,10 @@ impl Collapse<'_> {
         let cost = self.costs.slots[node];
         // More slots than help are not taken.
         let useful = (0..slots).find(|&k| cost[k] == cost[slots - 1]).map_or(slots, |k| k + 1);
-        match children(&self.binary, node) {
+        match self.binary.nodes[node].children() {
             Some(below) if useful > 1 => self.split(below, useful, cut),
             _ => cut.push(node),
         }
-    }
-
-    /// The primitives below a node, in the tree's order.
-    fn below(&self, node: usize) -> Vec<u32> {
-        let mut numbers = Vec::new();
-        let mut stack = vec![node];
-        while let Some(node) = stack.pop() {
-            match children(&self.binary, node) {
-                Some([l, r]) => stack.extend([r, l]),
-                None => numbers.extend_from_slice(leaf_primitives(&self.binary, node)),
-            }
-        }
-        numbers
     }
 
     /// A leaf, or where there are too many for one, nodes that halve the primitives' order three times.

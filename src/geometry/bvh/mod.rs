@@ -1,12 +1,13 @@
 //! The hierarchy of boxes: eight children to a node, all tested at once.
 
+mod binary;
 mod collapse;
 
 use super::leaves::{Child, Leaves, Run, Word};
 use super::nearest::Nearest;
 use super::packet::{LaneRay, ShearedRay};
 use super::simd::{Column, Kernel, Lanes, dispatch};
-use super::{Bounds, Ray};
+use super::{Bounds, HIT_ROUNDING, Ray};
 use arrayvec::ArrayVec;
 
 /// Deepest hierarchy that is built.
@@ -14,11 +15,6 @@ const MAX_DEPTH: usize = 36;
 
 /// Room for all that waits while a ray walks the hierarchy: seven children on each level, and the root.
 const STACK: usize = 7 * MAX_DEPTH + 4;
-
-/// How far computed hits may lie off their primitive, as a multiple of the rounding of the largest coordinate
-/// in the frame of the ray: three for the corners' place across the ray, nine for the distance along it, and
-/// some more for the box test itself. Boxes are grown by this much, so none that holds a hit is missed.
-const HIT_ROUNDING: f32 = 16.0 * f32::EPSILON;
 
 /// A hierarchy over the primitives of a scene.
 #[derive(Debug)]
@@ -251,5 +247,61 @@ impl<F: FnMut(Run) -> bool> Kernel for Any<'_, F> {
             let Some(next) = stack.pop() else { return false };
             word = next;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::leaves::{Primitives, Source};
+    use super::super::mesh::{Mesh, MeshData};
+    use super::super::simd::Portable;
+    use super::*;
+    use crate::sampling::{SamplePoint, uniform_sphere};
+    use glam::Vec3;
+
+    /// Triangles of all sizes and directions, some of them flat or without area.
+    fn soup(count: u32) -> Primitives {
+        let mut mesh = MeshData::default();
+        for i in 0..count {
+            let sample = SamplePoint::new(5, i);
+            let at = Vec3::new(sample.get(0), sample.get(1), sample.get(2)) * 2.0 - 1.0;
+            let size = 0.3 * sample.get(3) * sample.get(3);
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend((0..3).map(|k| {
+                let p = at + uniform_sphere(SamplePoint::new(k, i).get_2d(0)) * size;
+                if i % 7 == 0 { p.with_y(at.y) } else { p }
+            }));
+            mesh.triangles.push([first, first + 1, first + if i % 11 == 0 { 1 } else { 2 }]);
+        }
+        let sources = (0..count).map(|index| Source::Triangle { mesh: 0, index }).collect();
+        Primitives { sources, meshes: vec![Mesh::new(&mesh)] }
+    }
+
+    #[test]
+    fn plain_and_wide_instructions_find_the_same_bits() {
+        let primitives = soup(3000);
+        let bounds: Vec<Bounds> = (0..3000).map(|i| primitives.meshes[0].triangle(i).bounds()).collect();
+        let mut leaves = Leaves::default();
+        let bvh = Bvh::build(&bounds, &primitives, &mut leaves);
+        let mut hits = 0;
+        for i in 0..4000 {
+            let sample = SamplePoint::new(6, i);
+            let origin = Vec3::new(sample.get(0), sample.get(1), sample.get(2)) * 3.0 - 1.5;
+            // Every third ray aims at a corner, every third runs along an axis.
+            let direction = match i % 3 {
+                0 => uniform_sphere(sample.get_2d(3)),
+                1 => (primitives.meshes[0].triangle(i % 3000).0[0] - origin).normalize(),
+                _ => Vec3::AXES[i as usize / 3 % 3],
+            };
+            let ray = &Ray::new(origin, direction);
+            let closest = || Closest { bvh: &bvh, leaves: &leaves, ray, others: |_, _: &mut Nearest| {} };
+            let (wide, plain) = (dispatch(closest()), closest().run(Portable));
+            assert_eq!((wide.t.to_bits(), wide.primitive), (plain.t.to_bits(), plain.primitive), "{i}");
+            let any = || Any { bvh: &bvh, leaves: &leaves, ray, t_max: 0.3, others: |_| false };
+            assert_eq!(dispatch(any()), any().run(Portable), "{i}");
+            assert_eq!(dispatch(any()), wide.t < 0.3, "{i}");
+            hits += u32::from(wide.place.is_some());
+        }
+        assert!((1000..3900).contains(&hits), "{hits}");
     }
 }
