@@ -213,12 +213,8 @@ impl Plan {
     }
 
     fn decide_structure(&mut self, scene: &Scene) {
-        let count = scene.geometry.primitive_count();
         let structure = scene.geometry.structure();
-        let reason = match structure {
-            "list" => format!("{count} primitives: testing each is quicker than walking a tree"),
-            _ => format!("{count} primitives"),
-        };
+        let reason = scene.geometry.structure_reason();
         self.decide("structure", structure != "list", structure, reason);
     }
 

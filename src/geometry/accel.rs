@@ -1,102 +1,107 @@
-//! The structure over the primitives: a plain list for a handful, a bounding-volume hierarchy for more.
+//! The structure over the primitives: a plain list for a handful, a hierarchy of boxes for more, and two
+//! rivals for comparison. All find the same hits to the last bit.
 
-use super::{Bounds, Ray};
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, builder::build_bvh2};
-use obvhs::ray::{Ray as BvhRay, RayHit};
-use obvhs::{Boundable, BvhBuildParams};
-use std::time::Duration;
+use super::Bounds;
+use super::bvh::Bvh;
+use super::grid::Grid;
+use super::leaves::{Leaves, Primitives, Word};
+use super::sphere_tree::SphereTree;
 
-/// Up to this many primitives are simply tested one after the other. Measured on spheres and polygons: the
-/// hierarchy's eight-wide nodes win from about a dozen on.
-const LIST_LIMIT: usize = 8;
+/// Up to this many primitives are simply tested one after the other (measured on spheres and polygons).
+const LIST_LIMIT: usize = 4;
+
+/// Which structure is built over the primitives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Structure {
+    /// A list for a handful of primitives, else boxes.
+    #[default]
+    Auto,
+    /// None: every primitive is tested.
+    List,
+    /// A uniform grid.
+    Grid,
+    /// A hierarchy of boxes.
+    Bvh,
+    /// A hierarchy of bounding spheres.
+    Spheres,
+}
+
+impl Structure {
+    /// Every value and its name.
+    pub const NAMED: [(&str, Self); 5] = [
+        ("auto", Self::Auto),
+        ("list", Self::List),
+        ("grid", Self::Grid),
+        ("bvh", Self::Bvh),
+        ("spheres", Self::Spheres),
+    ];
+}
 
 /// How the nearest primitive is found.
+#[derive(Debug)]
 pub(super) enum Accel {
-    /// Every primitive is tested; holds how many there are.
-    List(usize),
-    /// A binary hierarchy of boxes, built and walked by `obvhs`; of any depth, as many equal primitives make.
-    Bvh(Box<Bvh2>),
-}
-
-impl std::fmt::Debug for Accel {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl Boundable for Bounds {
-    fn aabb(&self) -> Aabb {
-        Aabb::new(self.min.into(), self.max.into())
-    }
+    /// Every primitive is tested.
+    List(Vec<Word>),
+    /// A uniform grid.
+    Grid(Box<Grid>),
+    /// A hierarchy of boxes.
+    Bvh(Bvh),
+    /// A hierarchy of bounding spheres.
+    Spheres(SphereTree),
 }
 
 impl Accel {
-    /// Builds the structure; also returns which primitive goes into which slot.
-    pub(super) fn build(bounds: &[Bounds]) -> (Self, Vec<u32>) {
-        if bounds.len() <= LIST_LIMIT {
-            return (Self::List(bounds.len()), (0..bounds.len() as u32).collect());
-        }
-        let mut build_time = Duration::ZERO;
-        let mut bvh = build_bvh2(bounds, BvhBuildParams::medium_build(), &mut build_time);
-        let order = std::mem::take(&mut bvh.primitive_indices);
-        (Self::Bvh(Box::new(bvh)), order)
-    }
-
-    /// Visits slots nearest first as far as the structure knows. `test` gets a slot and the distance beyond
-    /// which it need not look, and returns the distance of a hit nearer than that.
-    #[inline]
-    pub(super) fn closest(&self, ray: &Ray, mut test: impl FnMut(usize, f32) -> Option<f32>) {
-        match self {
-            Self::List(count) => {
-                let mut t_max = f32::INFINITY;
-                for slot in 0..*count {
-                    if let Some(t) = test(slot, t_max) {
-                        t_max = t;
-                    }
-                }
+    /// Builds the structure and puts the primitives into leaves in its order.
+    pub(super) fn build(structure: Structure, bounds: &[Bounds], primitives: &Primitives) -> (Self, Leaves) {
+        let mut leaves = Leaves::default();
+        let accel = match structure {
+            Structure::Auto if bounds.len() > LIST_LIMIT => {
+                Self::Bvh(Bvh::build(bounds, primitives, &mut leaves))
             }
-            Self::Bvh(bvh) => {
-                let ray = bvh_ray(ray, f32::INFINITY);
-                bvh.ray_traverse(ray, &mut RayHit::none(), |ray, slot| {
-                    test(slot, ray.tmax).unwrap_or(f32::INFINITY)
-                });
+            Structure::Auto | Structure::List => Self::List(leaves.add_all(primitives)),
+            Structure::Bvh => Self::Bvh(Bvh::build(bounds, primitives, &mut leaves)),
+            Structure::Grid => {
+                leaves.add_all(primitives);
+                Self::Grid(Box::new(Grid::build(&leaves.placed(bounds))))
             }
-        }
-    }
-
-    /// True if `test` holds for any slot on the ray before `t_max`.
-    #[inline]
-    pub(super) fn any(&self, ray: &Ray, t_max: f32, mut test: impl FnMut(usize) -> bool) -> bool {
-        match self {
-            Self::List(count) => (0..*count).any(test),
-            Self::Bvh(bvh) => {
-                !bvh.ray_traverse_miss(
-                    bvh_ray(ray, t_max),
-                    |_, slot| {
-                        if test(slot) { 0.0 } else { f32::INFINITY }
-                    },
-                )
+            Structure::Spheres => {
+                leaves.add_all(primitives);
+                Self::Spheres(SphereTree::build(&leaves.placed(bounds)))
             }
-        }
+        };
+        (accel, leaves)
     }
 
     pub(super) fn name(&self) -> &'static str {
         match self {
             Self::List(_) => "list",
+            Self::Grid(_) => "grid",
             Self::Bvh(_) => "bvh",
+            Self::Spheres(_) => "spheres",
         }
     }
 
-    pub(super) fn memory_bytes(&self) -> u64 {
+    /// Why this structure, or what came of it.
+    pub(super) fn reason(&self, asked: Structure, primitives: usize) -> String {
+        let why = match self {
+            Self::List(_) if asked == Structure::Auto => "testing each is quicker than walking a tree".into(),
+            Self::List(_) => "each is tested, as asked for".into(),
+            Self::Grid(grid) => format!("a uniform grid, as asked for: {}", grid.describe()),
+            Self::Bvh(_) if asked == Structure::Auto => "boxes skip most of them for every ray".into(),
+            Self::Bvh(_) => "boxes, as asked for".into(),
+            Self::Spheres(_) => {
+                "bounding spheres, as asked for: boxes fit flat and long things better".into()
+            }
+        };
+        format!("{primitives} primitives: {why}")
+    }
+
+    pub(super) fn memory_bytes(&self) -> usize {
         match self {
-            Self::List(_) => 0,
-            Self::Bvh(bvh) => size_of_val(&bvh.nodes[..]) as u64,
+            Self::List(words) => size_of_val(&words[..]),
+            Self::Grid(grid) => grid.memory_bytes(),
+            Self::Bvh(bvh) => bvh.memory_bytes(),
+            Self::Spheres(tree) => tree.memory_bytes(),
         }
     }
-}
-
-#[inline]
-fn bvh_ray(ray: &Ray, t_max: f32) -> BvhRay {
-    BvhRay::new(ray.origin.into(), ray.direction.into(), 0.0, t_max)
 }

@@ -53,6 +53,13 @@ impl Bounds {
         (self.max - self.min).length() * 0.5
     }
 
+    /// Half the area of its surface.
+    #[must_use]
+    pub fn half_area(&self) -> f32 {
+        let size = self.max - self.min;
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+
     /// True if it holds no point.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -1,7 +1,6 @@
-//! Triangle meshes, and ray against triangle without gaps at shared edges.
+//! Triangle meshes: what is shared between the triangles.
 
-use super::bounds::Bounds;
-use super::{Ray, SurfacePoint};
+use super::packet::{Triangle, TriangleShading};
 use glam::{Vec2, Vec3};
 
 /// A triangle mesh as it is read from a file: shared vertices and triangles between them.
@@ -17,105 +16,57 @@ pub struct MeshData {
     pub uvs: Vec<Vec2>,
 }
 
-/// The corners of a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Triangle(pub(super) [Vec3; 3]);
+/// A mesh of a scene. The corners of its triangles stand in the structure's leaves once that is built.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Mesh(MeshData);
 
-/// What is interpolated over a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct TriangleShading {
-    pub(super) normals: Option<[Vec3; 3]>,
-    pub(super) uvs: [Vec2; 3],
-}
-
-/// A ray prepared for the watertight test of Woop, Benthin and Wald (2013): the coordinate along which it
-/// runs most becomes z, and the other two are sheared so that the ray is the z axis.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ShearedRay {
-    origin: Vec3,
-    axes: [usize; 3],
-    shear: Vec3,
-}
-
-impl ShearedRay {
-    #[inline]
-    pub(super) fn new(ray: &Ray) -> Self {
-        let d = ray.direction;
-        let a = d.abs();
-        let z = if a.x >= a.y && a.x >= a.z {
-            0
-        } else if a.y >= a.z {
-            1
-        } else {
-            2
-        };
-        // The winding does not matter: both sides are hit.
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let shear = Vec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]);
-        Self { origin: ray.origin, axes: [x, y, z], shear }
+impl Mesh {
+    pub(super) fn new(data: &MeshData) -> Self {
+        Self(data.clone())
     }
 
-    /// A corner in the sheared space; the same corner gives the same result for every triangle.
-    #[inline]
-    fn transform(&self, corner: Vec3) -> Vec3 {
-        let p = corner - self.origin;
-        let [x, y, z] = self.axes;
-        Vec3::new(p[x] - self.shear.x * p[z], p[y] - self.shear.y * p[z], self.shear.z * p[z])
-    }
-}
-
-impl Triangle {
-    /// Distance along the ray in `(0, t_max)` and the barycentric weights of the three corners.
-    #[inline]
-    pub(super) fn intersect(&self, ray: &ShearedRay, t_max: f32) -> Option<(f32, Vec3)> {
-        let [a, b, c] = self.0.map(|corner| ray.transform(corner));
-        let mut u = c.x * b.y - c.y * b.x;
-        let mut v = a.x * c.y - a.y * c.x;
-        let mut w = b.x * a.y - b.y * a.x;
-        if u == 0.0 || v == 0.0 || w == 0.0 {
-            // On an edge in f32: decide in f64, where the products are exact.
-            let exact =
-                |p: Vec3, q: Vec3| (f64::from(p.x) * f64::from(q.y) - f64::from(p.y) * f64::from(q.x)) as f32;
-            (u, v, w) = (exact(c, b), exact(a, c), exact(b, a));
-        }
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let determinant = u + v + w;
-        if determinant == 0.0 {
-            return None;
-        }
-        let weights = Vec3::new(u, v, w) / determinant;
-        let t = weights.dot(Vec3::new(a.z, b.z, c.z));
-        (t > 0.0 && t < t_max).then_some((t, weights))
+    pub(super) fn triangle(&self, index: u32) -> Triangle {
+        Triangle(self.0.triangles[index as usize].map(|v| self.0.positions[v as usize]))
     }
 
-    /// The surface at the point with these barycentric weights.
-    pub(super) fn surface(&self, weights: Vec3, shading: &TriangleShading) -> SurfacePoint {
-        let [a, b, c] = self.0;
-        let point = a * weights.x + b * weights.y + c * weights.z;
-        let size = (a * weights.x).abs() + (b * weights.y).abs() + (c * weights.z).abs();
-        let normal = (b - a).cross(c - a).normalize_or(Vec3::Y);
-        let shading_normal = match shading.normals {
-            None => normal,
-            Some([p, q, r]) => {
-                let n = (p * weights.x + q * weights.y + r * weights.z).normalize_or(normal);
-                // Vertex normals decide which side is outside only together with the winding.
-                if n.dot(normal) < 0.0 { -n } else { n }
-            }
-        };
-        let [p, q, r] = shading.uvs;
-        SurfacePoint {
-            point,
-            // Seven rounded operations (gamma_7), half an ulp each.
-            error: size.max_element() * (3.5 * f32::EPSILON),
-            normal,
-            shading_normal,
-            uv: p * weights.x + q * weights.y + r * weights.z,
+    /// What is interpolated over a triangle.
+    pub(super) fn shading(&self, index: u32) -> TriangleShading {
+        let Some(corners) = self.0.triangles.get(index as usize) else { return TriangleShading::FLAT };
+        let corners = corners.map(|v| v as usize);
+        TriangleShading {
+            normals: (!self.0.normals.is_empty()).then(|| corners.map(|v| self.0.normals[v])),
+            uvs: if self.0.uvs.is_empty() {
+                TriangleShading::FLAT.uvs
+            } else {
+                corners.map(|v| self.0.uvs[v])
+            },
         }
     }
 
-    pub(super) fn bounds(&self) -> Bounds {
-        Bounds::of(self.0).padded()
+    /// Positions of the vertices that triangles use.
+    pub(super) fn vertices(&self) -> &[Vec3] {
+        &self.0.positions
+    }
+
+    /// Drops what is no longer needed once the triangles stand in the leaves: vertices that none uses, and of
+    /// flat triangles which vertices they have.
+    pub(super) fn settle(&mut self) {
+        let mesh = &mut self.0;
+        let mut used = vec![false; mesh.positions.len()];
+        mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        let mut used = used.into_iter();
+        mesh.positions.retain(|_| used.next().unwrap_or(false));
+        mesh.positions.shrink_to_fit();
+        if mesh.normals.is_empty() && mesh.uvs.is_empty() {
+            mesh.triangles = Vec::new();
+        }
+    }
+
+    pub(super) fn memory_bytes(&self) -> usize {
+        let MeshData { positions, triangles, normals, uvs } = &self.0;
+        size_of_val(&positions[..])
+            + size_of_val(&triangles[..])
+            + size_of_val(&normals[..])
+            + size_of_val(&uvs[..])
     }
 }

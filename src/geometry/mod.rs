@@ -2,12 +2,22 @@
 
 mod accel;
 mod bounds;
+mod builder;
+mod bvh;
+mod grid;
+mod leaves;
 mod mesh;
+mod nearest;
+mod packet;
 mod polygon;
 mod ray;
+mod simd;
 mod sphere;
+mod sphere_tree;
 
+pub use accel::Structure;
 pub use bounds::Bounds;
+pub use builder::GeometryBuilder;
 pub use mesh::MeshData;
 pub use polygon::PolygonError;
 pub use ray::{Ray, offset_origin};
@@ -16,9 +26,17 @@ pub use sphere::roots as sphere_roots;
 use crate::scene::ObjectId;
 use accel::Accel;
 use glam::{Vec2, Vec3};
-use mesh::{ShearedRay, Triangle, TriangleShading};
+use leaves::{Child, Entry, Leaves, Run, Shape, Word};
+use mesh::Mesh;
+use nearest::{Nearest, Place};
+use packet::ShearedRay;
 use polygon::{Edge, Polygon};
 use sphere::Sphere;
+
+/// How far computed hits may lie off their primitive, as a multiple of the rounding of the largest coordinate
+/// in the frame of the ray: three for the corners' place across the ray, nine for the distance along it, and
+/// some more for the box test itself. Boxes are grown by this much, so none that holds a hit is missed.
+const HIT_ROUNDING: f32 = 16.0 * f32::EPSILON;
 
 /// All primitives of a scene and the structure over them.
 #[derive(Debug)]
@@ -26,28 +44,27 @@ pub struct Geometry {
     spheres: Vec<Sphere>,
     polygons: Vec<Polygon>,
     edges: Vec<Edge>,
-    triangles: Vec<Triangle>,
-    shading: Vec<TriangleShading>,
-    /// What the structure's slots hold, in its order.
-    primitives: Vec<Primitive>,
+    meshes: Vec<Mesh>,
+    /// The primitives in the order of the structure.
+    leaves: Leaves,
+    /// Whose each primitive is, in the order of their numbers.
+    owners: Vec<Owner>,
+    /// Number of primitives.
+    count: usize,
     /// Box of each object; empty for an object without primitives.
     object_bounds: Vec<Bounds>,
     accel: Accel,
+    /// The structure that was asked for.
+    asked: Structure,
 }
 
-/// One thing a ray can hit.
+/// Primitives with successive numbers that belong to one object; triangles also to one mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Primitive {
-    shape: Shape,
+struct Owner {
+    first: u32,
     object: ObjectId,
-}
-
-/// A primitive's kind and its index in that kind's array.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Shape {
-    Sphere(u32),
-    Polygon(u32),
-    Triangle(u32),
+    /// The triangles' mesh; `None` for other primitives.
+    mesh: Option<u32>,
 }
 
 /// A point of a surface.
@@ -95,61 +112,137 @@ fn point(position: &Vec3) -> HullPoint {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SheetId(pub u32);
 
-/// The nearest primitive and what its test has computed.
-struct Nearest {
-    slot: usize,
-    t: f32,
-    weights: Vec3,
-}
-
 impl Geometry {
     /// The first surface along the ray.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let sheared = ShearedRay::new(ray);
-        let mut nearest: Option<Nearest> = None;
-        self.accel.closest(ray, |slot, t_max| {
-            let (t, weights) = self.intersect(slot, ray, &sheared, t_max)?;
-            nearest = Some(Nearest { slot, t, weights });
-            Some(t)
-        });
-        let nearest = nearest?;
-        let Primitive { shape, object } = self.primitives[nearest.slot];
-        let surface = match shape {
-            Shape::Sphere(i) => self.spheres[i as usize].surface(ray, nearest.t),
-            Shape::Polygon(i) => self.polygons[i as usize].surface(ray, nearest.t),
-            Shape::Triangle(i) => {
-                self.triangles[i as usize].surface(nearest.weights, &self.shading[i as usize])
+        let others = |run: Run, nearest: &mut Nearest| self.closest_of_run(run, ray, nearest);
+        let nearest = match &self.accel {
+            Accel::List(words) => self.closest_of_list(words, ray),
+            Accel::Bvh(bvh) => bvh.closest(&self.leaves, ray, others),
+            Accel::Grid(grid) => {
+                let sheared = ShearedRay::new(ray);
+                grid.closest(ray, |place, nearest| self.closest_of_place(place, ray, &sheared, nearest))
+            }
+            Accel::Spheres(tree) => {
+                let sheared = ShearedRay::new(ray);
+                tree.closest(ray, |place, nearest| self.closest_of_place(place, ray, &sheared, nearest))
             }
         };
-        Some(Hit { t: nearest.t, surface, object, sheet: self.sheet(shape, object) })
+        let place = nearest.place?;
+        let owner = self.owner(nearest.primitive);
+        let surface = match place {
+            Place::Entry(entry) => match self.leaves.entries[entry as usize].shape {
+                Shape::Sphere(i) => self.spheres[i as usize].surface(ray, nearest.t),
+                Shape::Polygon(i) => self.polygons[i as usize].surface(ray, nearest.t),
+            },
+            Place::Triangle(slot) => {
+                let triangle = self.leaves.triangle(slot);
+                let (_, weights) = triangle.intersect(&ShearedRay::new(ray), f32::INFINITY)?;
+                let mesh = &self.meshes[owner.mesh? as usize];
+                let shading = mesh.shading(nearest.primitive - owner.first);
+                triangle.surface(weights, &shading)
+            }
+        };
+        Some(Hit { t: nearest.t, surface, object: owner.object, sheet: self.sheet(place, owner.object) })
     }
 
     /// True if any surface lies strictly between the ray's origin and the distance `t_max`.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray, t_max: f32) -> bool {
+        let others = |run: Run| self.entries(run).any(|(_, e)| self.meets(e, ray, t_max).is_some());
+        match &self.accel {
+            Accel::List(words) => self.any_of_list(words, ray, t_max),
+            Accel::Bvh(bvh) => bvh.any(&self.leaves, ray, t_max, others),
+            Accel::Grid(grid) => {
+                let sheared = ShearedRay::new(ray);
+                grid.any(ray, t_max, |place| self.place_meets(place, ray, &sheared, t_max).is_some())
+            }
+            Accel::Spheres(tree) => {
+                let sheared = ShearedRay::new(ray);
+                tree.any(ray, t_max, |place| self.place_meets(place, ray, &sheared, t_max).is_some())
+            }
+        }
+    }
+
+    fn closest_of_place(&self, place: Place, ray: &Ray, sheared: &ShearedRay, nearest: &mut Nearest) {
+        if let Some(t) = self.place_meets(place, ray, sheared, nearest.limit()) {
+            let primitive = match place {
+                Place::Triangle(slot) => self.leaves.number(slot),
+                Place::Entry(entry) => self.leaves.entries[entry as usize].primitive,
+            };
+            nearest.offer(t, primitive, place);
+        }
+    }
+
+    fn place_meets(&self, place: Place, ray: &Ray, sheared: &ShearedRay, t_max: f32) -> Option<f32> {
+        match place {
+            Place::Triangle(slot) => self.leaves.triangle(slot).intersect(sheared, t_max).map(|(t, _)| t),
+            Place::Entry(entry) => self.meets(&self.leaves.entries[entry as usize], ray, t_max),
+        }
+    }
+
+    fn closest_of_list(&self, words: &[Word], ray: &Ray) -> Nearest {
         let sheared = ShearedRay::new(ray);
-        self.accel.any(ray, t_max, |slot| self.intersect(slot, ray, &sheared, t_max).is_some())
+        let mut nearest = Nearest::NONE;
+        for word in words {
+            match word.child() {
+                Child::Packet(index) => {
+                    self.leaves.packets[index].closest_one_by_one(&sheared, index, &mut nearest)
+                }
+                Child::Run(run) => self.closest_of_run(run, ray, &mut nearest),
+                Child::Node(_) => {}
+            }
+        }
+        nearest
+    }
+
+    fn any_of_list(&self, words: &[Word], ray: &Ray, t_max: f32) -> bool {
+        let sheared = ShearedRay::new(ray);
+        words.iter().any(|word| match word.child() {
+            Child::Packet(index) => self.leaves.packets[index].any_one_by_one(&sheared, t_max),
+            Child::Run(run) => self.entries(run).any(|(_, e)| self.meets(e, ray, t_max).is_some()),
+            Child::Node(_) => false,
+        })
     }
 
     #[inline]
-    fn intersect(&self, slot: usize, ray: &Ray, sheared: &ShearedRay, t_max: f32) -> Option<(f32, Vec3)> {
-        match self.primitives[slot].shape {
-            Shape::Triangle(i) => self.triangles[i as usize].intersect(sheared, t_max),
-            Shape::Polygon(i) => {
-                self.polygons[i as usize].intersect(ray, t_max, &self.edges).map(|t| (t, Vec3::ZERO))
+    fn closest_of_run(&self, run: Run, ray: &Ray, nearest: &mut Nearest) {
+        for (index, entry) in self.entries(run) {
+            if let Some(t) = self.meets(entry, ray, nearest.limit()) {
+                nearest.offer(t, entry.primitive, Place::Entry(index as u32));
             }
-            Shape::Sphere(i) => self.spheres[i as usize].intersect(ray, t_max).map(|t| (t, Vec3::ZERO)),
         }
+    }
+
+    #[inline]
+    fn entries(&self, run: Run) -> impl Iterator<Item = (usize, &Entry)> {
+        (run.first..).zip(&self.leaves.entries[run.first..run.first + run.count])
+    }
+
+    #[inline]
+    fn meets(&self, entry: &Entry, ray: &Ray, t_max: f32) -> Option<f32> {
+        match entry.shape {
+            Shape::Polygon(i) => self.polygons[i as usize].intersect(ray, t_max, &self.edges),
+            Shape::Sphere(i) => self.spheres[i as usize].intersect(ray, t_max),
+        }
+    }
+
+    /// The owner of a primitive.
+    fn owner(&self, primitive: u32) -> Owner {
+        let after = self.owners.partition_point(|owner| owner.first <= primitive);
+        self.owners[after - 1]
     }
 
     /// Polygons are sheets of their own, since each clips the kernel at its own outline; an object's
     /// triangles form one sheet, and a sphere is one.
-    fn sheet(&self, shape: Shape, object: ObjectId) -> SheetId {
-        match shape {
-            Shape::Polygon(i) => SheetId(i),
-            Shape::Sphere(_) | Shape::Triangle(_) => SheetId(self.polygons.len() as u32 + object.0),
+    fn sheet(&self, place: Place, object: ObjectId) -> SheetId {
+        if let Place::Entry(entry) = place
+            && let Shape::Polygon(i) = self.leaves.entries[entry as usize].shape
+        {
+            return SheetId(i);
         }
+        SheetId(self.polygons.len() as u32 + object.0)
     }
 
     /// Share of the density estimate's kernel around `point` that lies on the sheet (1 where unknown).
@@ -168,14 +261,18 @@ impl Geometry {
     #[must_use]
     pub fn hull(&self, object: ObjectId) -> Vec<HullPoint> {
         let mut hull = Vec::new();
-        for primitive in self.primitives.iter().filter(|p| p.object == object) {
-            match primitive.shape {
+        for entry in self.leaves.entries.iter().filter(|e| self.owner(e.primitive).object == object) {
+            match entry.shape {
                 Shape::Sphere(i) => {
                     let Sphere { center, radius } = self.spheres[i as usize];
                     hull.push(HullPoint { position: center, radius });
                 }
                 Shape::Polygon(i) => hull.extend(self.polygons[i as usize].corners().iter().map(point)),
-                Shape::Triangle(i) => hull.extend(self.triangles[i as usize].0.iter().map(point)),
+            }
+        }
+        for owner in self.owners.iter().filter(|o| o.object == object) {
+            if let Some(mesh) = owner.mesh {
+                hull.extend(self.meshes[mesh as usize].vertices().iter().map(point));
             }
         }
         hull
@@ -190,7 +287,7 @@ impl Geometry {
     /// Number of primitives.
     #[must_use]
     pub fn primitive_count(&self) -> usize {
-        self.primitives.len()
+        self.count
     }
 
     /// The structure a ray is tested against, in words.
@@ -199,105 +296,20 @@ impl Geometry {
         self.accel.name()
     }
 
+    /// Why this structure, or what came of it.
+    #[must_use]
+    pub fn structure_reason(&self) -> String {
+        self.accel.reason(self.asked, self.count)
+    }
+
     /// Bytes held by the primitives and the structure.
     #[must_use]
     pub fn memory_bytes(&self) -> u64 {
         let arrays = size_of_val(&self.spheres[..])
             + size_of_val(&self.polygons[..])
             + size_of_val(&self.edges[..])
-            + size_of_val(&self.triangles[..])
-            + size_of_val(&self.shading[..])
-            + size_of_val(&self.primitives[..]);
-        arrays as u64 + self.accel.memory_bytes()
-    }
-}
-
-/// Collects primitives; [`GeometryBuilder::build`] makes the structure over them.
-#[derive(Debug, Default)]
-pub struct GeometryBuilder {
-    spheres: Vec<Sphere>,
-    polygons: Vec<Polygon>,
-    edges: Vec<Edge>,
-    triangles: Vec<Triangle>,
-    shading: Vec<TriangleShading>,
-    primitives: Vec<Primitive>,
-}
-
-impl GeometryBuilder {
-    /// Adds a sphere. The radius is positive.
-    pub fn sphere(&mut self, object: ObjectId, center: Vec3, radius: f32) {
-        let shape = Shape::Sphere(self.spheres.len() as u32);
-        self.spheres.push(Sphere { center, radius });
-        self.primitives.push(Primitive { shape, object });
-    }
-
-    /// Adds a planar polygon: an outline and the outlines of its holes, by the even-odd rule.
-    ///
-    /// # Errors
-    /// See [`PolygonError`]; nothing is added then.
-    pub fn polygon(&mut self, object: ObjectId, outlines: &[Vec<Vec3>]) -> Result<(), PolygonError> {
-        let polygon = Polygon::new(outlines, &mut self.edges)?;
-        let shape = Shape::Polygon(self.polygons.len() as u32);
-        self.polygons.push(polygon);
-        self.primitives.push(Primitive { shape, object });
-        Ok(())
-    }
-
-    /// Adds a triangle mesh. Indices are in range.
-    pub fn mesh(&mut self, object: ObjectId, mesh: &MeshData) {
-        for &indices in &mesh.triangles {
-            let shape = Shape::Triangle(self.triangles.len() as u32);
-            let corner = |k: usize| indices[k] as usize;
-            self.triangles.push(Triangle(std::array::from_fn(|k| mesh.positions[corner(k)])));
-            let normals =
-                (!mesh.normals.is_empty()).then(|| std::array::from_fn(|k| mesh.normals[corner(k)]));
-            let uvs = if mesh.uvs.is_empty() {
-                [Vec2::ZERO, Vec2::X, Vec2::Y]
-            } else {
-                std::array::from_fn(|k| mesh.uvs[corner(k)])
-            };
-            self.shading.push(TriangleShading { normals, uvs });
-            self.primitives.push(Primitive { shape, object });
-        }
-    }
-
-    /// Builds the structure over all primitives.
-    #[must_use]
-    pub fn build(self) -> Geometry {
-        let bounds: Vec<Bounds> = self.primitives.iter().map(|p| self.bounds_of(p.shape)).collect();
-        let objects = self.primitives.iter().map(|p| p.object.index() + 1).max().unwrap_or(0);
-        let mut object_bounds = vec![Bounds::EMPTY; objects];
-        for (primitive, b) in self.primitives.iter().zip(&bounds) {
-            let whole = &mut object_bounds[primitive.object.index()];
-            *whole = whole.union(*b);
-        }
-        let (accel, order) = Accel::build(&bounds);
-        let mut geometry = Geometry {
-            spheres: self.spheres,
-            polygons: self.polygons,
-            edges: self.edges,
-            triangles: Vec::new(),
-            shading: Vec::new(),
-            primitives: order.iter().map(|&i| self.primitives[i as usize]).collect(),
-            object_bounds,
-            accel,
-        };
-        // Triangles are laid out in the order in which the structure visits them.
-        for primitive in &mut geometry.primitives {
-            if let Shape::Triangle(i) = &mut primitive.shape {
-                geometry.triangles.push(self.triangles[*i as usize]);
-                geometry.shading.push(self.shading[*i as usize]);
-                *i = geometry.triangles.len() as u32 - 1;
-            }
-        }
-        geometry
-    }
-
-    fn bounds_of(&self, shape: Shape) -> Bounds {
-        match shape {
-            Shape::Sphere(i) => self.spheres[i as usize].bounds(),
-            Shape::Polygon(i) => self.polygons[i as usize].bounds(),
-            Shape::Triangle(i) => self.triangles[i as usize].bounds(),
-        }
+            + size_of_val(&self.owners[..])
+            + self.meshes.iter().map(Mesh::memory_bytes).sum::<usize>();
+        (arrays + self.leaves.memory_bytes() + self.accel.memory_bytes()) as u64
     }
 }

@@ -90,7 +90,7 @@ impl Polygon {
     pub(super) fn intersect(&self, ray: &Ray, t_max: f32, edges: &[Edge]) -> Option<f32> {
         let direction = ray.direction.as_dvec3();
         let t = self.plane_distance(ray, direction)?;
-        if !(t > 0.0 && t < f64::from(t_max)) {
+        if !(t > 0.0 && (t as f32) < t_max) {
             return None;
         }
         let p = ray.origin.as_dvec3() + direction * t;

@@ -23,8 +23,8 @@ impl Sphere {
             self.center.as_dvec3(),
             f64::from(self.radius),
         )?;
-        let t = if near > 0.0 { near } else { far };
-        (t > 0.0 && t < f64::from(t_max)).then_some(t as f32)
+        let t = if near > 0.0 { near } else { far } as f32;
+        (t > 0.0 && t < t_max).then_some(t)
     }
 
     /// The surface where the ray meets it at about `t`, with the point put back onto the sphere.

@@ -10,6 +10,7 @@ use super::read::{
     uv,
 };
 use super::{Paths, Tone};
+use crate::geometry::Structure;
 use crate::radius::RadiusRule;
 use std::collections::BTreeSet;
 
@@ -279,6 +280,8 @@ record! {
         stop: Option<StopFile> = optional(object::<StopFile>()),
         /// Radius of the caustics' density estimate: a pixel, or shrinking from round to round.
         radius: RadiusRule = or(choice(RadiusRule::NAMED.to_vec()), RadiusRule::Pixel),
+        /// The structure that finds what a ray meets; all find the same.
+        structure: Structure = or(choice(Structure::NAMED.to_vec()), Structure::Auto),
         /// Seed of every random stream.
         seed: u64 = or(seed(), 0),
     }

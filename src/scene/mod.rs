@@ -20,7 +20,7 @@ pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{Light, QuadLight};
 pub use material::{Material, Texture};
 
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, Structure};
 use crate::radius::RadiusRule;
 use glam::{Vec2, Vec3};
 
@@ -148,6 +148,8 @@ pub struct RenderSettings {
     pub stop: Stop,
     /// Radius of the caustics' density estimate.
     pub radius: RadiusRule,
+    /// The structure over the primitives.
+    pub structure: Structure,
     /// Seed of every random stream.
     pub seed: u64,
 }

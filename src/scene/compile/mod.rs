@@ -80,7 +80,7 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         camera: camera?,
         materials: compiler.materials,
         objects: compiler.objects,
-        geometry: compiler.geometry.build(),
+        geometry: compiler.geometry.build_as(render.as_ref()?.structure),
         lights: compiler.lights,
         environment: file.environment.as_ref()?.as_ref().map_or(Vec3::ZERO, |e| vec3(e.radiance)),
         render: render?,
@@ -192,7 +192,8 @@ impl<'f> Compiler<'f> {
                 Stop { error: error.map(|e| e as f32), seconds: *seconds, rounds: *rounds }
             }
         };
-        Some(RenderSettings { paths: render.paths, stop, radius: render.radius, seed: render.seed })
+        let RenderFile { paths, radius, structure, seed, stop: _ } = *render;
+        Some(RenderSettings { paths, stop, radius, structure, seed })
     }
 }
 

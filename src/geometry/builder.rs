@@ -1,0 +1,103 @@
+//! Collects the primitives of a scene.
+
+use super::accel::{Accel, Structure};
+use super::leaves::{Primitives, Shape, Source};
+use super::mesh::{Mesh, MeshData};
+use super::polygon::{Edge, Polygon, PolygonError};
+use super::sphere::Sphere;
+use super::{Bounds, Geometry, Owner};
+use crate::scene::ObjectId;
+use glam::Vec3;
+
+/// Collects primitives; [`GeometryBuilder::build`] makes the structure over them.
+#[derive(Debug, Default)]
+pub struct GeometryBuilder {
+    spheres: Vec<Sphere>,
+    polygons: Vec<Polygon>,
+    edges: Vec<Edge>,
+    primitives: Primitives,
+    owners: Vec<Owner>,
+}
+
+impl GeometryBuilder {
+    /// Adds a sphere. The radius is positive.
+    pub fn sphere(&mut self, object: ObjectId, center: Vec3, radius: f32) {
+        let shape = Shape::Sphere(self.spheres.len() as u32);
+        self.spheres.push(Sphere { center, radius });
+        self.other(object, shape);
+    }
+
+    /// Adds a planar polygon: an outline and the outlines of its holes, by the even-odd rule.
+    ///
+    /// # Errors
+    /// See [`PolygonError`]; nothing is added then.
+    pub fn polygon(&mut self, object: ObjectId, outlines: &[Vec<Vec3>]) -> Result<(), PolygonError> {
+        let polygon = Polygon::new(outlines, &mut self.edges)?;
+        let shape = Shape::Polygon(self.polygons.len() as u32);
+        self.polygons.push(polygon);
+        self.other(object, shape);
+        Ok(())
+    }
+
+    /// Adds a triangle mesh. Indices are in range.
+    pub fn mesh(&mut self, object: ObjectId, mesh: &MeshData) {
+        let index = self.primitives.meshes.len() as u32;
+        let first = self.primitives.sources.len() as u32;
+        self.owners.push(Owner { first, object, mesh: Some(index) });
+        let triangles = 0..mesh.triangles.len() as u32;
+        self.primitives.sources.extend(triangles.map(|i| Source::Triangle { mesh: index, index: i }));
+        self.primitives.meshes.push(Mesh::new(mesh));
+    }
+
+    fn other(&mut self, object: ObjectId, shape: Shape) {
+        let owner = Owner { first: self.primitives.sources.len() as u32, object, mesh: None };
+        if self.owners.last().is_none_or(|last| (last.object, last.mesh) != (object, None)) {
+            self.owners.push(owner);
+        }
+        self.primitives.sources.push(Source::Other(shape));
+    }
+
+    /// Builds the structure that suits the primitives.
+    #[must_use]
+    pub fn build(self) -> Geometry {
+        self.build_as(Structure::Auto)
+    }
+
+    /// Builds a structure over all primitives.
+    #[must_use]
+    pub fn build_as(mut self, structure: Structure) -> Geometry {
+        let sources = &self.primitives.sources;
+        let bounds: Vec<Bounds> = sources.iter().map(|source| self.bounds_of(*source)).collect();
+        let objects = self.owners.iter().map(|owner| owner.object.index() + 1).max().unwrap_or(0);
+        let mut object_bounds = vec![Bounds::EMPTY; objects];
+        let ends = self.owners.iter().skip(1).map(|next| next.first as usize).chain([sources.len()]);
+        for (owner, end) in self.owners.iter().zip(ends) {
+            let whole = &mut object_bounds[owner.object.index()];
+            *whole = bounds[owner.first as usize..end].iter().fold(*whole, |a, b| a.union(*b));
+        }
+        let (accel, leaves) = Accel::build(structure, &bounds, &self.primitives);
+        self.primitives.meshes.iter_mut().for_each(Mesh::settle);
+        Geometry {
+            spheres: self.spheres,
+            polygons: self.polygons,
+            edges: self.edges,
+            meshes: self.primitives.meshes,
+            leaves,
+            owners: self.owners,
+            count: self.primitives.sources.len(),
+            object_bounds,
+            accel,
+            asked: structure,
+        }
+    }
+
+    fn bounds_of(&self, source: Source) -> Bounds {
+        match source {
+            Source::Triangle { mesh, index } => {
+                self.primitives.meshes[mesh as usize].triangle(index).bounds()
+            }
+            Source::Other(Shape::Sphere(i)) => self.spheres[i as usize].bounds(),
+            Source::Other(Shape::Polygon(i)) => self.polygons[i as usize].bounds(),
+        }
+    }
+}

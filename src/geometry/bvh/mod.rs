@@ -1,0 +1,307 @@
+//! The hierarchy of boxes: eight children to a node, all tested at once.
+
+mod binary;
+mod collapse;
+
+use super::leaves::{Child, Leaves, Run, Word};
+use super::nearest::Nearest;
+use super::packet::{LaneRay, ShearedRay};
+use super::simd::{Column, Kernel, Lanes, dispatch};
+use super::{Bounds, HIT_ROUNDING, Ray};
+use arrayvec::ArrayVec;
+
+/// Deepest hierarchy that is built.
+const MAX_DEPTH: usize = 36;
+
+/// Room for all that waits while a ray walks the hierarchy: seven children on each level, and the root.
+const STACK: usize = 7 * MAX_DEPTH + 4;
+
+/// A hierarchy over the primitives of a scene.
+#[derive(Debug)]
+pub(super) struct Bvh {
+    nodes: Vec<Node>,
+    root: Option<Word>,
+    bounds: Bounds,
+}
+
+/// Eight boxes and what is in them.
+#[derive(Clone, Debug)]
+#[repr(C, align(32))]
+struct Node {
+    /// Least and greatest x, then y, then z; an empty interval where there is no child.
+    planes: [Column; 6],
+    children: [Word; 8],
+}
+
+impl Bvh {
+    pub(super) fn memory_bytes(&self) -> usize {
+        size_of_val(&self.nodes[..])
+    }
+
+    /// Finds the nearest hit. `others` tests a run of primitives that are not triangles.
+    #[inline]
+    pub(super) fn closest(
+        &self,
+        leaves: &Leaves,
+        ray: &Ray,
+        others: impl FnMut(Run, &mut Nearest),
+    ) -> Nearest {
+        dispatch(Closest { bvh: self, leaves, ray, others })
+    }
+
+    /// True if anything is hit before `t_max`.
+    #[inline]
+    pub(super) fn any(
+        &self,
+        leaves: &Leaves,
+        ray: &Ray,
+        t_max: f32,
+        others: impl FnMut(Run) -> bool,
+    ) -> bool {
+        dispatch(Any { bvh: self, leaves, ray, t_max, others })
+    }
+}
+
+/// A ray prepared for the boxes.
+struct Slabs<L: Lanes> {
+    /// The origin moved against the planes that the ray enters by, and its reciprocal direction.
+    enter: [L::F; 3],
+    /// The origin moved towards the planes that the ray leaves by.
+    leave: [L::F; 3],
+    inverse: [L::F; 3],
+    /// Which planes are entered and left.
+    enter_plane: [usize; 3],
+    zero: L::F,
+}
+
+impl<L: Lanes> Slabs<L> {
+    #[inline(always)]
+    fn new(lanes: L, ray: &Ray, bounds: &Bounds) -> Self {
+        let (origin, direction) = (ray.origin, ray.direction);
+        let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs()).max_element();
+        let slack = reach * HIT_ROUNDING;
+        // Rounding the sum must not undo it.
+        let (above, below) = (origin + slack, origin - slack);
+        let above = [above.x.next_up(), above.y.next_up(), above.z.next_up()];
+        let below = [below.x.next_down(), below.y.next_down(), below.z.next_down()];
+        let mut slabs = Self {
+            enter: [lanes.splat(0.0); 3],
+            leave: [lanes.splat(0.0); 3],
+            inverse: [lanes.splat(0.0); 3],
+            enter_plane: [0; 3],
+            zero: lanes.splat(0.0),
+        };
+        for axis in 0..3 {
+            let inverse = 1.0 / direction[axis];
+            let backwards = inverse < 0.0;
+            slabs.enter[axis] = lanes.splat(if backwards { below[axis] } else { above[axis] });
+            slabs.leave[axis] = lanes.splat(if backwards { above[axis] } else { below[axis] });
+            slabs.inverse[axis] = lanes.splat(inverse);
+            slabs.enter_plane[axis] = usize::from(backwards);
+        }
+        slabs
+    }
+
+    /// Which children the ray meets no later than `t_max`, and where it enters them.
+    #[inline(always)]
+    fn meets(&self, lanes: L, node: &Node, t_max: L::F) -> (u32, L::F) {
+        let [x, y, z] = self.enter_plane;
+        let [x0, y0, z0] = [&node.planes[x & 1], &node.planes[2 + (y & 1)], &node.planes[4 + (z & 1)]];
+        let [x1, y1, z1] =
+            [&node.planes[x & 1 ^ 1], &node.planes[2 + (y & 1 ^ 1)], &node.planes[4 + (z & 1 ^ 1)]];
+        let enter = Self::later(lanes, self.at(lanes, x0, self.enter[0], 0), self.zero);
+        let enter = Self::later(lanes, self.at(lanes, y0, self.enter[1], 1), enter);
+        let enter = Self::later(lanes, self.at(lanes, z0, self.enter[2], 2), enter);
+        let leave = Self::sooner(lanes, self.at(lanes, x1, self.leave[0], 0), t_max);
+        let leave = Self::sooner(lanes, self.at(lanes, y1, self.leave[1], 1), leave);
+        let leave = Self::sooner(lanes, self.at(lanes, z1, self.leave[2], 2), leave);
+        (lanes.at_most(enter, leave), enter)
+    }
+
+    #[inline(always)]
+    fn at(&self, lanes: L, plane: &Column, origin: L::F, axis: usize) -> L::F {
+        lanes.mul(lanes.sub(lanes.load(plane), origin), self.inverse[axis])
+    }
+
+    /// The later of two distances. The first is not a number where the ray runs within a plane, and then does
+    /// not count.
+    #[inline(always)]
+    fn later(lanes: L, plane: L::F, other: L::F) -> L::F {
+        lanes.max(plane, other)
+    }
+
+    /// The sooner of two distances, as in [`Slabs::later`].
+    #[inline(always)]
+    fn sooner(lanes: L, plane: L::F, other: L::F) -> L::F {
+        lanes.min(plane, other)
+    }
+}
+
+/// What waits to be walked, and where the ray enters it.
+type Stack = ArrayVec<(Word, f32), STACK>;
+
+struct Closest<'a, F> {
+    bvh: &'a Bvh,
+    leaves: &'a Leaves,
+    ray: &'a Ray,
+    others: F,
+}
+
+impl<F: FnMut(Run, &mut Nearest)> Kernel for Closest<'_, F> {
+    type Output = Nearest;
+
+    #[inline(always)]
+    fn run<L: Lanes>(mut self, lanes: L) -> Nearest {
+        let mut nearest = Nearest::NONE;
+        let Some(mut word) = self.bvh.root else { return nearest };
+        let slabs = Slabs::new(lanes, self.ray, &self.bvh.bounds);
+        let sheared = ShearedRay::new(self.ray);
+        let lane_ray = LaneRay::new(lanes, &sheared);
+        let mut stack = Stack::new();
+        loop {
+            match word.child() {
+                Child::Node(index) => {
+                    let node = &self.bvh.nodes[index];
+                    let (mask, enter) = slabs.meets(lanes, node, lanes.splat(nearest.t));
+                    if mask & mask.wrapping_sub(1) != 0 {
+                        push_sorted(&mut stack, node, mask, &lanes.store(enter));
+                    } else if mask != 0 {
+                        word = node.children[mask.trailing_zeros() as usize % 8];
+                        continue;
+                    }
+                }
+                Child::Packet(index) => {
+                    self.leaves.packets[index].closest(lanes, (&lane_ray, &sheared), index, &mut nearest);
+                }
+                Child::Run(run) => (self.others)(run, &mut nearest),
+            }
+            word = loop {
+                match stack.pop() {
+                    None => return nearest,
+                    Some((word, enter)) if enter <= nearest.t => break word,
+                    Some(_) => {}
+                }
+            };
+        }
+    }
+}
+
+/// Pushes the children of a mask, nearest last.
+#[inline(always)]
+fn push_sorted(stack: &mut Stack, node: &Node, mut mask: u32, enter: &Column) {
+    let base = stack.len();
+    while mask != 0 {
+        let lane = mask.trailing_zeros() as usize % 8;
+        mask &= mask - 1;
+        let item = (node.children[lane], enter[lane]);
+        stack.push(item);
+        let mut at = stack.len() - 1;
+        while at > base && stack[at - 1].1 < item.1 {
+            stack[at] = stack[at - 1];
+            at -= 1;
+        }
+        stack[at] = item;
+    }
+}
+
+struct Any<'a, F> {
+    bvh: &'a Bvh,
+    leaves: &'a Leaves,
+    ray: &'a Ray,
+    t_max: f32,
+    others: F,
+}
+
+impl<F: FnMut(Run) -> bool> Kernel for Any<'_, F> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(mut self, lanes: L) -> bool {
+        let Some(mut word) = self.bvh.root else { return false };
+        let slabs = Slabs::new(lanes, self.ray, &self.bvh.bounds);
+        let sheared = ShearedRay::new(self.ray);
+        let lane_ray = LaneRay::new(lanes, &sheared);
+        let t_max = lanes.splat(self.t_max.min(f32::MAX));
+        let mut stack: ArrayVec<Word, STACK> = ArrayVec::new();
+        loop {
+            match word.child() {
+                Child::Node(index) => {
+                    let node = &self.bvh.nodes[index];
+                    let (mut mask, _) = slabs.meets(lanes, node, t_max);
+                    while mask != 0 {
+                        stack.push(node.children[mask.trailing_zeros() as usize % 8]);
+                        mask &= mask - 1;
+                    }
+                }
+                Child::Packet(index) => {
+                    if self.leaves.packets[index].any(lanes, (&lane_ray, &sheared), self.t_max) {
+                        return true;
+                    }
+                }
+                Child::Run(run) => {
+                    if (self.others)(run) {
+                        return true;
+                    }
+                }
+            }
+            let Some(next) = stack.pop() else { return false };
+            word = next;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::leaves::{Primitives, Source};
+    use super::super::mesh::{Mesh, MeshData};
+    use super::super::simd::Portable;
+    use super::*;
+    use crate::sampling::{SamplePoint, uniform_sphere};
+    use glam::Vec3;
+
+    /// Triangles of all sizes and directions, some of them flat or without area.
+    fn soup(count: u32) -> Primitives {
+        let mut mesh = MeshData::default();
+        for i in 0..count {
+            let sample = SamplePoint::new(5, i);
+            let at = Vec3::new(sample.get(0), sample.get(1), sample.get(2)) * 2.0 - 1.0;
+            let size = 0.3 * sample.get(3) * sample.get(3);
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend((0..3).map(|k| {
+                let p = at + uniform_sphere(SamplePoint::new(k, i).get_2d(0)) * size;
+                if i % 7 == 0 { p.with_y(at.y) } else { p }
+            }));
+            mesh.triangles.push([first, first + 1, first + if i % 11 == 0 { 1 } else { 2 }]);
+        }
+        let sources = (0..count).map(|index| Source::Triangle { mesh: 0, index }).collect();
+        Primitives { sources, meshes: vec![Mesh::new(&mesh)] }
+    }
+
+    #[test]
+    fn plain_and_wide_instructions_find_the_same_bits() {
+        let primitives = soup(3000);
+        let bounds: Vec<Bounds> = (0..3000).map(|i| primitives.meshes[0].triangle(i).bounds()).collect();
+        let mut leaves = Leaves::default();
+        let bvh = Bvh::build(&bounds, &primitives, &mut leaves);
+        let mut hits = 0;
+        for i in 0..4000 {
+            let sample = SamplePoint::new(6, i);
+            let origin = Vec3::new(sample.get(0), sample.get(1), sample.get(2)) * 3.0 - 1.5;
+            // Every third ray aims at a corner, every third runs along an axis.
+            let direction = match i % 3 {
+                0 => uniform_sphere(sample.get_2d(3)),
+                1 => (primitives.meshes[0].triangle(i % 3000).0[0] - origin).normalize(),
+                _ => Vec3::AXES[i as usize / 3 % 3],
+            };
+            let ray = &Ray::new(origin, direction);
+            let closest = || Closest { bvh: &bvh, leaves: &leaves, ray, others: |_, _: &mut Nearest| {} };
+            let (wide, plain) = (dispatch(closest()), closest().run(Portable));
+            assert_eq!((wide.t.to_bits(), wide.primitive), (plain.t.to_bits(), plain.primitive), "{i}");
+            let any = || Any { bvh: &bvh, leaves: &leaves, ray, t_max: 0.3, others: |_| false };
+            assert_eq!(dispatch(any()), any().run(Portable), "{i}");
+            assert_eq!(dispatch(any()), wide.t < 0.3, "{i}");
+            hits += u32::from(wide.place.is_some());
+        }
+        assert!((1000..3900).contains(&hits), "{hits}");
+    }
+}

@@ -1,0 +1,40 @@
+//! The nearest hit so far.
+
+/// Where a primitive lies in the structure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// Lane `slot % 8` of packet `slot / 8`.
+    Triangle(u32),
+    /// Index among the other primitives.
+    Entry(u32),
+}
+
+/// The nearest hit so far. Of two at the same distance the primitive that came first in the scene counts, so
+/// that the order in which a structure visits them does not show.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearest {
+    /// Its distance; the largest float if there is none yet.
+    pub(super) t: f32,
+    /// Number of the primitive.
+    pub(super) primitive: u32,
+    /// Where it lies; `None` if there is no hit yet.
+    pub(super) place: Option<Place>,
+}
+
+impl Nearest {
+    pub(super) const NONE: Self = Self { t: f32::MAX, primitive: u32::MAX, place: None };
+
+    /// Takes a hit if it is nearer.
+    #[inline]
+    pub(super) fn offer(&mut self, t: f32, primitive: u32, place: Place) {
+        if t < self.t || (t == self.t && primitive < self.primitive) {
+            *self = Self { t, primitive, place: Some(place) };
+        }
+    }
+
+    /// Hits below this distance may still count.
+    #[inline]
+    pub(super) fn limit(&self) -> f32 {
+        self.t.next_up()
+    }
+}

@@ -1,0 +1,293 @@
+//! Ray against triangles, without gaps at shared edges: eight at a time, and one by itself.
+//!
+//! The test of Woop, Benthin and Wald (*Watertight Ray/Triangle Intersection*, 2013): corners are moved into a
+//! space in which the ray is the z axis, which gives the same numbers for every triangle that shares the corner,
+//! and the signs of the three edge functions there are exact.
+
+use super::bounds::Bounds;
+use super::nearest::{Nearest, Place};
+use super::simd::{Column, Lanes};
+use super::{Ray, SurfacePoint};
+use glam::{Vec2, Vec3};
+
+/// The corners of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Triangle(pub(super) [Vec3; 3]);
+
+/// What is interpolated over a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TriangleShading {
+    pub(super) normals: Option<[Vec3; 3]>,
+    pub(super) uvs: [Vec2; 3],
+}
+
+impl TriangleShading {
+    /// What a triangle without normals or texture coordinates has.
+    pub(super) const FLAT: Self = Self { normals: None, uvs: [Vec2::ZERO, Vec2::X, Vec2::Y] };
+}
+
+/// A ray prepared for the test: the coordinate along which it runs most becomes z, and the other two are
+/// sheared so that the ray is the z axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShearedRay {
+    origin: Vec3,
+    axes: [usize; 3],
+    shear: Vec3,
+}
+
+impl ShearedRay {
+    #[inline]
+    pub(super) fn new(ray: &Ray) -> Self {
+        let d = ray.direction;
+        let a = d.abs();
+        let z = if a.x >= a.y && a.x >= a.z {
+            0
+        } else if a.y >= a.z {
+            1
+        } else {
+            2
+        };
+        // The winding does not matter: both sides are hit.
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let shear = Vec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]);
+        Self { origin: ray.origin, axes: [x, y, z], shear }
+    }
+
+    /// A corner in the sheared space.
+    #[inline]
+    fn transform(&self, corner: Vec3) -> Vec3 {
+        let p = corner - self.origin;
+        let [x, y, z] = self.axes;
+        Vec3::new(p[x] - self.shear.x * p[z], p[y] - self.shear.y * p[z], self.shear.z * p[z])
+    }
+}
+
+impl Triangle {
+    /// Distance along the ray in `(0, t_max)` and the barycentric weights of the three corners.
+    #[inline]
+    pub(super) fn intersect(&self, ray: &ShearedRay, t_max: f32) -> Option<(f32, Vec3)> {
+        let [a, b, c] = self.0.map(|corner| ray.transform(corner));
+        let mut u = c.x * b.y - c.y * b.x;
+        let mut v = a.x * c.y - a.y * c.x;
+        let mut w = b.x * a.y - b.y * a.x;
+        if u == 0.0 || v == 0.0 || w == 0.0 {
+            // On an edge in f32: decide in f64, where the products are exact.
+            let exact =
+                |p: Vec3, q: Vec3| (f64::from(p.x) * f64::from(q.y) - f64::from(p.y) * f64::from(q.x)) as f32;
+            (u, v, w) = (exact(c, b), exact(a, c), exact(b, a));
+        }
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let determinant = u + v + w;
+        // A triangle seen from its edge has determinant 0 and a distance that is not a number.
+        let t = (u * a.z + v * b.z + w * c.z) / determinant;
+        (t > 0.0 && t < t_max).then(|| (t, Vec3::new(u, v, w) / determinant))
+    }
+
+    /// The surface at the point with these barycentric weights.
+    pub(super) fn surface(&self, weights: Vec3, shading: &TriangleShading) -> SurfacePoint {
+        let [a, b, c] = self.0;
+        let point = a * weights.x + b * weights.y + c * weights.z;
+        let size = (a * weights.x).abs() + (b * weights.y).abs() + (c * weights.z).abs();
+        let normal = (b - a).cross(c - a).normalize_or(Vec3::Y);
+        let shading_normal = match shading.normals {
+            None => normal,
+            Some([p, q, r]) => {
+                let n = (p * weights.x + q * weights.y + r * weights.z).normalize_or(normal);
+                // Vertex normals decide which side is outside only together with the winding.
+                if n.dot(normal) < 0.0 { -n } else { n }
+            }
+        };
+        let [p, q, r] = shading.uvs;
+        SurfacePoint {
+            point,
+            // Seven rounded operations (gamma_7), half an ulp each.
+            error: size.max_element() * (3.5 * f32::EPSILON),
+            normal,
+            shading_normal,
+            uv: p * weights.x + q * weights.y + r * weights.z,
+        }
+    }
+
+    pub(super) fn bounds(&self) -> Bounds {
+        Bounds::of(self.0).padded()
+    }
+}
+
+/// Up to eight triangles in columns.
+#[derive(Clone, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Packet {
+    /// `corners[k][axis]`: one coordinate of corner `k`; NaN in lanes that hold no triangle.
+    corners: [[Column; 3]; 3],
+    /// Number of the primitive in each lane.
+    primitives: [u32; 8],
+}
+
+/// A sheared ray in every lane.
+pub(super) struct LaneRay<L: Lanes> {
+    origin: [L::F; 3],
+    axes: [usize; 3],
+    shear: [L::F; 3],
+}
+
+impl<L: Lanes> LaneRay<L> {
+    #[inline(always)]
+    pub(super) fn new(lanes: L, ray: &ShearedRay) -> Self {
+        Self {
+            origin: [
+                lanes.splat(ray.origin[ray.axes[0]]),
+                lanes.splat(ray.origin[ray.axes[1]]),
+                lanes.splat(ray.origin[ray.axes[2]]),
+            ],
+            axes: ray.axes,
+            shear: [lanes.splat(ray.shear.x), lanes.splat(ray.shear.y), lanes.splat(ray.shear.z)],
+        }
+    }
+
+    /// [`ShearedRay::transform`] of eight corners.
+    #[inline(always)]
+    fn transform(&self, lanes: L, corner: &[Column; 3]) -> [L::F; 3] {
+        let [x, y, z] = self.axes;
+        let x = lanes.sub(lanes.load(&corner[x % 3]), self.origin[0]);
+        let y = lanes.sub(lanes.load(&corner[y % 3]), self.origin[1]);
+        let z = lanes.sub(lanes.load(&corner[z % 3]), self.origin[2]);
+        [
+            lanes.sub(x, lanes.mul(self.shear[0], z)),
+            lanes.sub(y, lanes.mul(self.shear[1], z)),
+            lanes.mul(self.shear[2], z),
+        ]
+    }
+}
+
+/// What eight tests say.
+struct Tested<F> {
+    /// Lanes that are certainly hit, at a positive distance.
+    hit: u32,
+    /// Lanes whose edge the ray may touch: decided one by one in f64.
+    edge: u32,
+    /// Distances.
+    t: F,
+}
+
+impl Packet {
+    /// Puts up to eight triangles with their numbers into one packet.
+    pub(super) fn new(triangles: impl IntoIterator<Item = (u32, Triangle)>) -> Self {
+        let mut packet = Self { corners: [[[f32::NAN; 8]; 3]; 3], primitives: [u32::MAX; 8] };
+        for (lane, (primitive, Triangle(corners))) in triangles.into_iter().enumerate() {
+            for (columns, corner) in packet.corners.iter_mut().zip(corners) {
+                for (axis, column) in columns.iter_mut().enumerate() {
+                    column[lane] = corner[axis];
+                }
+            }
+            packet.primitives[lane] = primitive;
+        }
+        packet
+    }
+
+    /// The number in each lane.
+    pub(super) fn primitives(&self) -> [u32; 8] {
+        self.primitives
+    }
+
+    #[inline]
+    pub(super) fn triangle(&self, lane: usize) -> Triangle {
+        Triangle(std::array::from_fn(|k| Vec3::from(self.corners[k].map(|column| column[lane]))))
+    }
+
+    /// Finds the nearest hit among its triangles; `index` is its own place.
+    #[inline(always)]
+    pub(super) fn closest<L: Lanes>(
+        &self,
+        lanes: L,
+        (ray, sheared): (&LaneRay<L>, &ShearedRay),
+        index: usize,
+        nearest: &mut Nearest,
+    ) {
+        let Tested { hit, mut edge, t } = self.test(lanes, ray);
+        let mut hit = hit & lanes.at_most(t, lanes.splat(nearest.t));
+        if hit | edge == 0 {
+            return;
+        }
+        let place = |lane: usize| Place::Triangle((index * 8 + lane) as u32);
+        let t = lanes.store(t);
+        while hit != 0 {
+            let lane = hit.trailing_zeros() as usize % 8;
+            hit &= hit - 1;
+            nearest.offer(t[lane], self.primitives[lane], place(lane));
+        }
+        while edge != 0 {
+            let lane = edge.trailing_zeros() as usize % 8;
+            edge &= edge - 1;
+            if let Some((t, _)) = self.triangle(lane).intersect(sheared, nearest.limit()) {
+                nearest.offer(t, self.primitives[lane], place(lane));
+            }
+        }
+    }
+
+    /// True if any of its triangles is hit before `t_max`.
+    #[inline(always)]
+    pub(super) fn any<L: Lanes>(
+        &self,
+        lanes: L,
+        (ray, sheared): (&LaneRay<L>, &ShearedRay),
+        t_max: f32,
+    ) -> bool {
+        let Tested { hit, mut edge, t } = self.test(lanes, ray);
+        if hit & lanes.less(t, lanes.splat(t_max)) != 0 {
+            return true;
+        }
+        while edge != 0 {
+            let lane = edge.trailing_zeros() as usize % 8;
+            edge &= edge - 1;
+            if self.triangle(lane).intersect(sheared, t_max).is_some() {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// [`Packet::closest`] without the instructions for eight at a time.
+    pub(super) fn closest_one_by_one(&self, ray: &ShearedRay, index: usize, nearest: &mut Nearest) {
+        for (lane, &primitive) in self.primitives.iter().enumerate() {
+            if let Some((t, _)) = self.triangle(lane).intersect(ray, nearest.limit()) {
+                nearest.offer(t, primitive, Place::Triangle((index * 8 + lane) as u32));
+            }
+        }
+    }
+
+    /// [`Packet::any`] without the instructions for eight at a time.
+    pub(super) fn any_one_by_one(&self, ray: &ShearedRay, t_max: f32) -> bool {
+        (0..8).any(|lane| self.triangle(lane).intersect(ray, t_max).is_some())
+    }
+
+    /// [`Triangle::intersect`] in every lane, operation by operation. An edge function that is not 0 in f32 has
+    /// the right sign, since rounding keeps the order of the two products.
+    #[inline(always)]
+    fn test<L: Lanes>(&self, lanes: L, ray: &LaneRay<L>) -> Tested<L::F> {
+        let a = ray.transform(lanes, &self.corners[0]);
+        let b = ray.transform(lanes, &self.corners[1]);
+        let c = ray.transform(lanes, &self.corners[2]);
+        let u = edge_function(lanes, c, b);
+        let v = edge_function(lanes, a, c);
+        let w = edge_function(lanes, b, a);
+        let zero = lanes.splat(0.0);
+        let least = lanes.min(lanes.min(u, v), w);
+        let most = lanes.max(lanes.max(u, v), w);
+        let inside = !(lanes.less(least, zero) & lanes.less(zero, most)) & 0xff;
+        if inside == 0 {
+            return Tested { hit: 0, edge: 0, t: zero };
+        }
+        let edge = inside & (lanes.equal(least, zero) | lanes.equal(most, zero));
+        let determinant = lanes.add(lanes.add(u, v), w);
+        let weighted = lanes.add(lanes.add(lanes.mul(u, a[2]), lanes.mul(v, b[2])), lanes.mul(w, c[2]));
+        let t = lanes.div(weighted, determinant);
+        Tested { hit: inside & !edge & lanes.less(zero, t), edge, t }
+    }
+}
+
+#[inline(always)]
+fn edge_function<L: Lanes>(lanes: L, p: [L::F; 3], q: [L::F; 3]) -> L::F {
+    lanes.sub(lanes.mul(p[0], q[1]), lanes.mul(p[1], q[0]))
+}
