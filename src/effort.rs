@@ -46,7 +46,7 @@ const LEAST_SAMPLES: f32 = 0.25;
 const SAMPLES_ALONE: f32 = 2.0;
 
 /// Blocks grow to at most this power of two of the plan's.
-pub const MOST_SHIFT: u32 = 4;
+pub const MOST_SHIFT: u32 = 6;
 
 /// Half width, in pixels, of the square over which an eye sample's variance is averaged.
 const WINDOW: usize = 2;

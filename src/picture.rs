@@ -6,18 +6,31 @@ use crate::light_path::PathClass;
 use crate::pass2_eye::Footprints;
 use crate::smooth::{Smoothing, smooth};
 use glam::Vec3;
+use std::borrow::Cow;
 
 /// A film with the smoothing of its caustics.
 pub struct Picture<'a> {
     film: &'a Film,
-    smoothing: Option<Smoothing>,
+    smoothing: Option<Cow<'a, Smoothing>>,
 }
 
 impl<'a> Picture<'a> {
     /// Smooths the film's caustics.
     #[must_use]
     pub fn new(film: &'a Film, footprints: &Footprints) -> Self {
-        Self { film, smoothing: smooth(film, footprints) }
+        Self { film, smoothing: smooth(film, footprints).map(Cow::Owned) }
+    }
+
+    /// A picture whose smoothing is known.
+    #[must_use]
+    pub fn with_smoothing(film: &'a Film, smoothing: Option<&'a Smoothing>) -> Self {
+        Self { film, smoothing: smoothing.map(Cow::Borrowed) }
+    }
+
+    /// The smoothing, to keep.
+    #[must_use]
+    pub fn into_smoothing(self) -> Option<Smoothing> {
+        self.smoothing.map(Cow::into_owned)
     }
 
     /// All classes together.

@@ -164,7 +164,9 @@ impl Plan {
             return;
         }
         let pixels = u64::from(scene.image.width) * u64::from(scene.image.height);
-        let per_round = pixels.next_power_of_two().ilog2().clamp(LEAST_LOG2, MOST_LOG2);
+        // The first round is small: what it finds decides how large the others are.
+        let first_round = (pixels / 4).max(1).next_power_of_two();
+        let per_round = first_round.ilog2().clamp(LEAST_LOG2, MOST_LOG2);
         for pilot in pilots {
             let share = delivered(&pilot) / total;
             if share == 0.0 {

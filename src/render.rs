@@ -10,6 +10,7 @@ use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::sampling::hash;
 use crate::scene::Scene;
+use crate::smooth::Smoothing;
 use cpu_time::ProcessTime;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -179,6 +180,8 @@ pub struct Render {
     eye: EyeCounts,
     /// Traced before the first round that has photons.
     footprints: Footprints,
+    /// The smoothing at the last milestone, and its number of rounds.
+    smoothing: Option<(u32, Option<Smoothing>)>,
     /// Blocks of photons used up.
     blocks: u32,
     /// Decided at the last round that [`is_milestone`].
@@ -217,6 +220,7 @@ impl Render {
             error: None,
             blocks: 0,
             footprints: Footprints::default(),
+            smoothing: None,
             effort: Effort::default(),
         }
     }
@@ -291,6 +295,7 @@ impl Render {
         let key = hash(self.scene.render.seed, u64::from(self.rounds()));
         self.effort = Effort::decide(&measured, self.plan.most_photon_shift(), key);
         self.error = picture.error_estimate();
+        self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));
     }
 
     /// Why the render is finished; `None` while it is not.
@@ -355,7 +360,12 @@ impl Render {
     /// The smoothed picture so far, from which image and layers can be had without smoothing again.
     #[must_use]
     pub fn picture(&self) -> Picture<'_> {
-        Picture::new(&self.film, &self.footprints)
+        match &self.smoothing {
+            Some((rounds, smoothing)) if *rounds == self.rounds() => {
+                Picture::with_smoothing(&self.film, smoothing.as_ref())
+            }
+            _ => Picture::new(&self.film, &self.footprints),
+        }
     }
 
     /// One class of paths so far; the layers add up to the picture.

@@ -54,8 +54,8 @@ pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
     let mean = sum / samples.len() as f32;
     let filtered: Vec<(Segment, Ladder)> = segment::segments(footprints)
         .into_par_iter()
-        .filter(|s| s.pixels.len() >= LEAST_PIXELS)
-        .filter(|s| s.pixels.iter().any(|&i| samples[i as usize].irradiance != [Vec3::ZERO; 2]))
+        .filter_map(|segment| segment.near(ladder::MOST_REACH, |i| samples[i].irradiance != [Vec3::ZERO; 2]))
+        .filter(|segment| segment.pixels.len() >= LEAST_PIXELS)
         .map(|segment| {
             let ladder = Ladder::climb(&segment, &samples, 0.1 * mean);
             (segment, ladder)

@@ -23,6 +23,9 @@ const LEVELS: [Level; 7] = [
     Level { boxes: &[8, 8] },
 ];
 
+/// How far the widest filter looks, in pixels.
+pub(super) const MOST_REACH: usize = 16;
+
 impl Level {
     /// Variance of the filter in each direction, pixels²: (w² - 1)/12 per box of w pixels.
     fn variance(self) -> f32 {
@@ -140,7 +143,9 @@ fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -
         .map(|y| {
             let choose_one = |x: usize| {
                 let i = y * width + x;
-                if weights[i] == 0.0 {
+                let widest = &levels[LEVELS.len() - 1].halves;
+                let dark = widest[0][i] == Vec3::ZERO && widest[1][i] == Vec3::ZERO;
+                if weights[i] == 0.0 || dark {
                     return Choice {
                         irradiance: 0.5 * (levels[0].halves[0][i] + levels[0].halves[1][i]),
                         squared_error: 0.0,

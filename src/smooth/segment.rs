@@ -22,6 +22,25 @@ impl Segment {
         (y - self.origin.1) * self.size.0 + x - self.origin.0
     }
 
+    /// The part of the segment in the box around its lit pixels, `margin` pixels wider on each side; `None` if
+    /// none is lit.
+    pub(super) fn near(self, margin: usize, lit: impl Fn(usize) -> bool) -> Option<Self> {
+        let stride = self.stride;
+        let at = |pixel: u32| (pixel as usize % stride, pixel as usize / stride);
+        let lit: Vec<u32> = self.pixels.iter().copied().filter(|&i| lit(i as usize)).collect();
+        if lit.is_empty() {
+            return None;
+        }
+        let bright = Self::of(lit, stride);
+        let low = (bright.origin.0.saturating_sub(margin), bright.origin.1.saturating_sub(margin));
+        let high = (bright.origin.0 + bright.size.0 + margin, bright.origin.1 + bright.size.1 + margin);
+        let inside = |&i: &u32| {
+            let (x, y) = at(i);
+            (low.0..high.0).contains(&x) && (low.1..high.1).contains(&y)
+        };
+        Some(Self::of(self.pixels.into_iter().filter(inside).collect(), stride))
+    }
+
     fn of(mut pixels: Vec<u32>, stride: usize) -> Self {
         pixels.sort_unstable();
         let (mut low, mut high) = ((usize::MAX, usize::MAX), (0, 0));
