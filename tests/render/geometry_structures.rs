@@ -76,8 +76,8 @@ fn ray(i: u32) -> Ray {
         5 => Ray::new(target, Vec3::new(1.0, 1.0, 1.0).normalize() * if i % 16 < 8 { 1.0 } else { -1.0 }),
         6 | 7 => {
             let axis = i as usize / 8 % 3;
-            let mut direction = Vec3::splat(if i % 2 == 0 { 0.0 } else { -0.0 });
-            direction[axis] = if i % 3 == 0 { 1.0 } else { -1.0 };
+            let mut direction = Vec3::splat(if i.is_multiple_of(2) { 0.0 } else { -0.0 });
+            direction[axis] = if i.is_multiple_of(3) { 1.0 } else { -1.0 };
             origin = target;
             origin[axis] = -direction[axis] * far;
             Ray::new(origin, direction)
