@@ -127,7 +127,8 @@ impl Collapse<'_> {
         let node = &self.binary.nodes[index];
         let Some(below) = node.children().filter(|_| depth < SPLIT_DEPTH && !self.costs.leaf[index]) else {
             let (first, count) = (node.first as usize, node.count as usize);
-            return self.by_order(&self.binary.order[first..first + count].to_vec());
+            let order = self.binary.order[first..first + count].to_vec();
+            return self.by_order(&order);
         };
         let mut cut = Vec::with_capacity(8);
         self.split(below, 8, &mut cut);
