@@ -79,7 +79,7 @@ fn polygon(outlines: &[&[[f32; 2]]]) -> Geometry {
     let mut builder = GeometryBuilder::default();
     let outlines: Vec<Vec<Vec3>> =
         outlines.iter().map(|o| o.iter().map(|&[x, z]| Vec3::new(x, 0.0, -z)).collect()).collect();
-    builder.polygon(ObjectId(0), &outlines).unwrap();
+    builder.polygon(ObjectId(0), &outlines).expect("the outlines span a plane");
     builder.build()
 }
 
@@ -199,9 +199,8 @@ fn f37_f39_f42_identical_and_flat_primitives_are_found_along_every_axis() {
     for _ in 0..1000 {
         builder.sphere(ObjectId(0), Vec3::ZERO, 0.5);
     }
-    let mut mesh = MeshData::default();
-    mesh.positions = vec![Vec3::ZERO; 3];
-    mesh.triangles = vec![[0, 1, 2]; 100];
+    let mesh =
+        MeshData { positions: vec![Vec3::ZERO; 3], triangles: vec![[0, 1, 2]; 100], ..MeshData::default() };
     builder.mesh(ObjectId(1), &mesh);
     let square = |axis: usize, at: f32| {
         [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[a, b]: [f32; 2]| {
