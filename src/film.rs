@@ -1,4 +1,4 @@
-//! The film: one layer per class of paths and half, as a mean over rounds.
+//! The film: one layer per class of paths and half, summed over rounds.
 
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
@@ -32,33 +32,103 @@ impl ClassSums {
     }
 }
 
+/// What one half of a pixel has gathered. The emitted and direct classes are sums over eye samples; what
+/// photons bring is a sum over rounds, weighted by the rounds' photons.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HalfSums {
+    /// Radiance per class; of the caustic class, what was looked up point by point.
+    pub classes: ClassSums,
+    /// Irradiance that photons bring to the pixel's footprint.
+    pub irradiance: Vec3,
+}
+
+/// Means of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelMeans {
+    /// Radiance per class in each half.
+    pub halves: [ClassSums; 2],
+    /// Irradiance of the pixel's footprint, in each half.
+    pub irradiance: [Vec3; 2],
+    /// Radiance of the pixel per irradiance of its footprint.
+    pub gain: Vec3,
+}
+
+impl PixelMeans {
+    /// Radiance per class, mean of the halves.
+    #[must_use]
+    pub fn class(&self, class: PathClass) -> Vec3 {
+        0.5 * (self.halves[0].get(class) + self.halves[1].get(class))
+    }
+
+    /// Radiance of all classes, mean of the halves.
+    #[must_use]
+    pub fn total(&self) -> Vec3 {
+        0.5 * (self.halves[0].total() + self.halves[1].total())
+    }
+}
+
 /// One pixel: two independent halves, each an estimate of the same radiance, W·sr⁻¹·m⁻².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelSums {
     /// Half A and half B.
-    pub halves: [ClassSums; 2],
+    pub halves: [HalfSums; 2],
+    /// Radiance per irradiance of the pixel's footprint, summed over the eye samples of both halves.
+    pub gain: Vec3,
+    /// Eye samples in each half.
+    pub samples: u32,
 }
 
 impl PixelSums {
-    pub(crate) fn scale(&mut self, factor: f32) {
+    /// Scales what was looked up point by point, to the mean over the look-ups of a round.
+    pub(crate) fn average_lookups(&mut self, factor: f32) {
         for half in &mut self.halves {
-            for class in &mut half.0 {
-                *class *= factor;
-            }
+            half.classes.0[PathClass::Caustic as usize] *= factor;
+        }
+    }
+
+    /// Scales all that photons brought by the round's weight.
+    fn weigh_photons(&mut self, weight: f32) {
+        self.average_lookups(weight);
+        for half in &mut self.halves {
+            half.irradiance *= weight;
         }
     }
 
     fn add(&mut self, other: &Self) {
+        self.gain += other.gain;
+        self.samples += other.samples;
         for (mine, theirs) in self.halves.iter_mut().zip(&other.halves) {
-            for (a, b) in mine.0.iter_mut().zip(&theirs.0) {
+            mine.irradiance += theirs.irradiance;
+            for (a, b) in mine.classes.0.iter_mut().zip(&theirs.classes.0) {
                 *a += *b;
             }
         }
     }
 
+    fn means(&self, photon_weight: f32) -> PixelMeans {
+        let per_sample = 1.0 / self.samples.max(1) as f32;
+        let per_photon = if photon_weight > 0.0 { 1.0 / photon_weight } else { 0.0 };
+        let gain = self.gain * (0.5 * per_sample);
+        let irradiance = self.halves.map(|half| half.irradiance * per_photon);
+        let halves = self.halves.map(|half| {
+            let mut means = half.classes;
+            for class in PathClass::ALL {
+                means.0[class as usize] *= match class {
+                    PathClass::Emitted | PathClass::Direct => per_sample,
+                    PathClass::Caustic => per_photon,
+                };
+            }
+            means.add(PathClass::Caustic, gain * half.irradiance * per_photon);
+            means
+        });
+        PixelMeans { halves, irradiance, gain }
+    }
+
     /// The class that holds a number that is not finite, if any.
     pub(crate) fn not_finite(&self) -> Option<PathClass> {
-        PathClass::ALL.into_iter().find(|&c| self.halves.iter().any(|h| !h.get(c).is_finite()))
+        PathClass::ALL
+            .into_iter()
+            .find(|&c| self.halves.iter().any(|h| !(h.classes.get(c) + h.irradiance).is_finite()))
     }
 }
 
@@ -89,6 +159,8 @@ pub struct Film {
     width: u32,
     height: u32,
     rounds: u32,
+    /// Sum of the rounds' photon weights.
+    photon_weight: f32,
     pixels: Vec<PixelSums>,
 }
 
@@ -97,7 +169,7 @@ impl Film {
     #[must_use]
     pub fn new(width: u32, height: u32) -> Self {
         let pixels = vec![PixelSums::default(); width as usize * height as usize];
-        Self { width, height, rounds: 0, pixels }
+        Self { width, height, rounds: 0, photon_weight: 0.0, pixels }
     }
 
     /// Bytes a film of this size holds.
@@ -106,12 +178,25 @@ impl Film {
         u64::from(width) * u64::from(height) * size_of::<PixelSums>() as u64
     }
 
-    /// Adds the next round.
-    pub fn add_round(&mut self, round: &RoundFilm) {
+    /// Adds the next round, whose photons count `photon_weight` times those of the first.
+    pub fn add_round(&mut self, mut round: RoundFilm, photon_weight: f32) {
         self.rounds += 1;
-        for (sum, pixel) in self.pixels.iter_mut().zip(&round.pixels) {
+        self.photon_weight += photon_weight;
+        for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
+            pixel.weigh_photons(photon_weight);
             sum.add(pixel);
         }
+    }
+
+    /// Means of every pixel, row by row.
+    pub fn means(&self) -> impl Iterator<Item = PixelMeans> + '_ {
+        self.pixels.iter().map(|pixel| pixel.means(self.photon_weight))
+    }
+
+    /// Sum of the rounds' photon weights.
+    #[must_use]
+    pub fn photon_weight(&self) -> f32 {
+        self.photon_weight
     }
 
     /// Number of rounds added.
@@ -120,59 +205,43 @@ impl Film {
         self.rounds
     }
 
-    /// All classes together.
+    /// All classes together, as they were gathered: nothing is smoothed.
     #[must_use]
-    pub fn image(&self) -> LinearImage {
-        self.map(|pixel| pixel.halves[0].total() + pixel.halves[1].total())
+    pub fn raw_image(&self) -> LinearImage {
+        self.map(|means| means.total())
     }
 
-    /// One class.
+    /// One class, as it was gathered.
     #[must_use]
-    pub fn layer(&self, class: PathClass) -> LinearImage {
-        self.map(|pixel| pixel.halves[0].get(class) + pixel.halves[1].get(class))
+    pub fn raw_layer(&self, class: PathClass) -> LinearImage {
+        self.map(|means| means.class(class))
     }
 
-    fn map(&self, sum: impl Fn(&PixelSums) -> Vec3) -> LinearImage {
-        let scale = if self.rounds == 0 { 0.0 } else { 0.5 / self.rounds as f32 };
-        let pixels = self.pixels.iter().map(|p| (sum(p) * scale).to_array()).collect();
+    fn map(&self, value: impl Fn(&PixelMeans) -> Vec3) -> LinearImage {
+        let pixels = self.means().map(|means| value(&means).to_array()).collect();
         LinearImage { width: self.width, height: self.height, pixels }
     }
 
-    /// Estimated relative error of the image: the root of the mean over pixels and channels of
-    /// σ² / (L² + (0.1 L_mean)²), with σ² = (A - B)²/4 the unbiased estimate of the mean's variance from its
-    /// two independent halves. Systematic error of the density estimate is not in it. `None` before the
-    /// first round.
+    /// Pixels across and down.
     #[must_use]
-    pub fn error_estimate(&self) -> Option<f32> {
-        if self.rounds == 0 {
-            return None;
-        }
-        let scale = 0.5 / self.rounds as f32;
-        let halves = |p: &PixelSums| (p.halves[0].total() * scale, p.halves[1].total() * scale);
-        let count = self.pixels.len() as f64;
-        let mean = self.pixels.iter().map(|p| luminous(halves(p).0 + halves(p).1)).sum::<f64>() / count;
-        let floor = (0.1 * mean).powi(2);
-        if mean == 0.0 {
-            return Some(0.0);
-        }
-        let relative = |p: &PixelSums| {
-            let (a, b) = halves(p);
-            let value = (a + b).as_dvec3();
-            let deviation = (a - b).as_dvec3();
-            (deviation * deviation / (value * value + floor)).element_sum() / 3.0
-        };
-        Some((self.pixels.iter().map(relative).sum::<f64>() / count).sqrt() as f32)
+    pub fn size(&self) -> (usize, usize) {
+        (self.width as usize, self.height as usize)
+    }
+
+    /// The sums over all rounds, row by row.
+    #[must_use]
+    pub fn pixels(&self) -> &[PixelSums] {
+        &self.pixels
     }
 
     /// Raw values for a checkpoint: rounds, then every number.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(4 + self.pixels.len() * size_of::<PixelSums>());
+        let mut bytes = Vec::with_capacity(8 + self.pixels.len() * PixelSums::WORDS * 4);
         bytes.extend(self.rounds.to_le_bytes());
-        for value in self.pixels.iter().flat_map(|p| p.halves.iter().flat_map(|h| h.0.iter())) {
-            for channel in value.to_array() {
-                bytes.extend(channel.to_le_bytes());
-            }
+        bytes.extend(self.photon_weight.to_le_bytes());
+        for pixel in &self.pixels {
+            pixel.visit(|word| bytes.extend(word.to_le_bytes()));
         }
         bytes
     }
@@ -181,19 +250,44 @@ impl Film {
     #[must_use]
     pub fn from_bytes(width: u32, height: u32, bytes: &[u8]) -> Option<Self> {
         let mut film = Self::new(width, height);
-        let (rounds, values) = bytes.split_first_chunk::<4>()?;
-        if values.len() != film.pixels.len() * size_of::<PixelSums>() {
+        let (rounds, rest) = bytes.split_first_chunk::<4>()?;
+        let (photon_weight, values) = rest.split_first_chunk::<4>()?;
+        if values.len() != film.pixels.len() * PixelSums::WORDS * 4 {
             return None;
         }
         film.rounds = u32::from_le_bytes(*rounds);
-        let mut channels = values.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
-        for value in film.pixels.iter_mut().flat_map(|p| p.halves.iter_mut().flat_map(|h| h.0.iter_mut())) {
-            *value = Vec3::new(channels.next()?, channels.next()?, channels.next()?);
+        film.photon_weight = f32::from_le_bytes(*photon_weight);
+        let mut words = values.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
+        for pixel in &mut film.pixels {
+            pixel.fill(|| words.next().unwrap_or(0));
         }
         Some(film)
     }
 }
 
-fn luminous(v: Vec3) -> f64 {
-    f64::from(v.element_sum()) / 3.0
+impl PixelSums {
+    /// Number of 32-bit words in a pixel.
+    const WORDS: usize = size_of::<Self>() / 4;
+
+    /// The numbers of a pixel as 32-bit words, in a fixed order.
+    fn visit(&self, mut word: impl FnMut(u32)) {
+        let mut vector = |v: Vec3| v.to_array().into_iter().for_each(|x| word(x.to_bits()));
+        for half in &self.halves {
+            half.classes.0.iter().for_each(|v| vector(*v));
+            vector(half.irradiance);
+        }
+        vector(self.gain);
+        word(self.samples);
+    }
+
+    /// The inverse of [`PixelSums::visit`].
+    fn fill(&mut self, mut word: impl FnMut() -> u32) {
+        let mut vector = || Vec3::from_array(std::array::from_fn(|_| f32::from_bits(word())));
+        for half in &mut self.halves {
+            half.classes.0.iter_mut().for_each(|v| *v = vector());
+            half.irradiance = vector();
+        }
+        self.gain = vector();
+        self.samples = word();
+    }
 }

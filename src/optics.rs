@@ -29,6 +29,15 @@ pub struct Outcome {
     pub flux_scale: f32,
 }
 
+impl Outcome {
+    /// Appends this way to a key that holds one bit per S after a leading 1.
+    #[inline]
+    #[must_use]
+    pub fn extend_key(&self, key: u64) -> u64 {
+        key << 1 | u64::from(self.event == Event::Refraction)
+    }
+}
+
 /// All ways a ray can leave a specular surface; what is missing of their fractions is absorbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interaction {

@@ -1,6 +1,7 @@
 //! Photons and the kd-tree that finds them again; the only file that names `kiddo`.
 
 use crate::geometry::SheetId;
+use crate::pass2_eye::Footprint;
 use glam::{Mat3, Vec3};
 use kiddo::leaf_strategy::FlatVec;
 use kiddo::{Eytzinger, KdTree, SquaredEuclidean};
@@ -31,7 +32,7 @@ struct Stored {
 
 type Tree = KdTree<f32, Stored, Eytzinger, FlatVec<f32, Stored, 3, 32>, 3, 32>;
 
-/// Bytes held per photon in the tree: twelve of position and 24 of [`Stored`]; the tree's arrays keep up to
+/// Bytes held per photon in the tree: twelve of position and 24 of `Stored`; the tree's arrays keep up to
 /// half as much again in reserve.
 pub const BYTES_PER_PHOTON: u64 = 36;
 
@@ -138,6 +139,44 @@ impl PhotonMap {
         found
     }
 }
+
+impl PhotonMap {
+    /// Power of the photons that lie on a pixel's footprint, W.
+    #[must_use]
+    pub fn flux_within(&self, footprint: &Footprint) -> Vec3 {
+        let Some(tree) = &self.tree else { return Vec3::ZERO };
+        let center = footprint.center();
+        let corners = footprint.corners.map(|corner| corner - center);
+        let radius2 = corners.iter().map(|c| c.length_squared()).fold(0.0, f32::max);
+        let normal = ROTATION * footprint.normal;
+        // Inward edge normals in the plane of the footprint, in the tree's frame: a point p is inside if
+        // p · inward ≥ offset for all four edges.
+        let turned = corners.map(|corner| ROTATION * corner);
+        let side = (turned[1] - turned[0]).cross(turned[2] - turned[1]).dot(normal).signum();
+        let edges: [(Vec3, f32); 4] = std::array::from_fn(|i| {
+            let inward = normal.cross(turned[(i + 1) % 4] - turned[i]) * side;
+            (inward, inward.dot(turned[i]))
+        });
+        let middle = ROTATION * center;
+        let mut sum = Vec3::ZERO;
+        tree.query(&middle.to_array())
+            .within::<SquaredEuclidean<f32>>(radius2 * WIDER)
+            .unsorted()
+            .with_points()
+            .visit(|hit| {
+                let photon = hit.item;
+                let at = Vec3::from_array(hit.point) - middle;
+                let inside = edges.iter().all(|(inward, offset)| at.dot(*inward) >= *offset);
+                if inside && photon.sheet == footprint.sheet.0 && photon.arrives_on(footprint.normal) {
+                    sum += Vec3::from_array(photon.power);
+                }
+            });
+        sum
+    }
+}
+
+/// Rounding must not lose a photon at a corner.
+const WIDER: f32 = 1.0 + 1e-4;
 
 impl From<&Photon> for Stored {
     fn from(photon: &Photon) -> Self {

@@ -1,5 +1,6 @@
 //! The plan: what this scene needs, what is left out, and why.
 
+use crate::effort::MOST_SHIFT;
 use crate::film::Film;
 use crate::light_path::Bounce;
 use crate::pass1_light::{self, Block, Budget, Source, Tally, Window};
@@ -15,8 +16,6 @@ use glam::Vec3;
 pub struct Plan {
     /// Photon windows and their budgets; empty if pass 1 does not run.
     pub photons: Vec<Budget>,
-    /// Eye samples per pixel, half and round.
-    pub eye_samples: u32,
     /// Radius of the density estimate.
     pub radius: RadiusRule,
     /// Each choice with its reason.
@@ -72,7 +71,6 @@ impl Plan {
     pub fn new(scene: &Scene) -> Self {
         let mut plan = Self {
             photons: Vec::new(),
-            eye_samples: 1,
             radius: scene.render.radius,
             decisions: Vec::new(),
             warnings: Vec::new(),
@@ -166,7 +164,9 @@ impl Plan {
             return;
         }
         let pixels = u64::from(scene.image.width) * u64::from(scene.image.height);
-        let per_round = pixels.next_power_of_two().ilog2().clamp(LEAST_LOG2, MOST_LOG2);
+        // The first round is small: what it finds decides how large the others are.
+        let first_round = (pixels / 4).max(1).next_power_of_two();
+        let per_round = first_round.ilog2().clamp(LEAST_LOG2, MOST_LOG2);
         for pilot in pilots {
             let share = delivered(&pilot) / total;
             if share == 0.0 {
@@ -220,8 +220,16 @@ impl Plan {
         self.decide("structure", structure != "list", structure, reason);
     }
 
+    /// How many doublings of the photons per round memory allows.
+    #[must_use]
+    pub fn most_photon_shift(&self) -> u32 {
+        let photons: u64 = self.photons.iter().map(|b| 1_u64 << b.log2_block).sum();
+        MOST_LOG2.saturating_sub(photons.max(1).next_power_of_two().ilog2()).min(MOST_SHIFT)
+    }
+
     fn estimate_memory(&self, scene: &Scene) -> u64 {
-        let photons: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
+        let a_round: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
+        let photons = a_round << self.most_photon_shift();
         // While a tree is built its photons stand in memory in three forms: as traced (56 bytes), as entries
         // and in the tree's arrays, which double as they grow.
         let per_photon = 56 + 3 * photon_map::BYTES_PER_PHOTON;

@@ -12,7 +12,7 @@ pub enum RadiusRule {
 }
 
 /// Radius of [`RadiusRule::Pixel`].
-const PIXEL: f64 = 1.5;
+const PIXEL: f64 = 0.7;
 
 /// First radius of [`RadiusRule::Progressive`]; the literature starts at several pixels.
 const PROGRESSIVE_START: f64 = 4.0;

@@ -1,12 +1,16 @@
 //! The method on one screen: pass 1, the photon maps, pass 2, the film; round after round until a stop.
 
+use crate::effort::{Effort, Measured};
 use crate::film::Film;
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
-use crate::pass1_light::{self, Tally};
-use crate::pass2_eye::{self, EyeContext, EyeCounts};
+use crate::pass1_light::{self, Blocks, Tally};
+use crate::pass2_eye::{self, EyeContext, EyeCounts, Footprints};
+use crate::picture::Picture;
 use crate::plan::Plan;
+use crate::sampling::hash;
 use crate::scene::Scene;
+use crate::smooth::Smoothing;
 use cpu_time::ProcessTime;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -174,6 +178,16 @@ pub struct Render {
     pass2: PassTime,
     windows: Vec<Tally>,
     eye: EyeCounts,
+    /// Traced before the first round that has photons.
+    footprints: Footprints,
+    /// The smoothing at the last milestone, and its number of rounds.
+    smoothing: Option<(u32, Option<Smoothing>)>,
+    /// Blocks of photons used up.
+    blocks: u32,
+    /// Decided at the last round that [`is_milestone`].
+    effort: Effort,
+    /// Estimated then.
+    error: Option<f32>,
 }
 
 /// With no limit given at all, this many rounds end a render that never reaches its error.
@@ -182,6 +196,12 @@ const MOST_ROUNDS: u32 = 1 << 20;
 /// Fewer rounds tell too little about the error to stop by it.
 const LEAST_ROUNDS: u32 = 2;
 
+/// True for 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, …: at these numbers of rounds the error is estimated and the
+/// render may stop by it. Between them the picture gains too little to be worth the estimate.
+fn is_milestone(rounds: u32) -> bool {
+    rounds.is_power_of_two() || (rounds.is_multiple_of(3) && (rounds / 3).is_power_of_two())
+}
+
 impl Render {
     /// A render that has yet to start.
     #[must_use]
@@ -189,7 +209,20 @@ impl Render {
         let film = Film::new(scene.image.width, scene.image.height);
         let windows = vec![Tally::default(); plan.photons.len()];
         let time = PassTime::default();
-        Self { scene, plan, film, pass1: time, pass2: time, windows, eye: EyeCounts::default() }
+        Self {
+            scene,
+            plan,
+            film,
+            pass1: time,
+            pass2: time,
+            windows,
+            eye: EyeCounts::default(),
+            error: None,
+            blocks: 0,
+            footprints: Footprints::default(),
+            smoothing: None,
+            effort: Effort::default(),
+        }
     }
 
     /// Renders the next round, in the rayon pool this is called in.
@@ -200,24 +233,69 @@ impl Render {
         control.start_round();
         let round = self.film.rounds();
         let start = Stopwatch::start();
+        let blocks = self.next_blocks();
+        if !self.plan.photons.is_empty() && self.footprints.size().0 == 0 {
+            self.footprints = Footprints::trace(&self.scene);
+        }
         let photons = if self.plan.photons.is_empty() {
             None
         } else {
-            Some(pass1_light::emit_photons(&self.scene, &self.plan.photons, round, control)?)
+            Some(pass1_light::emit_photons(&self.scene, &self.plan.photons, blocks, control)?)
         };
         let mut pass1 = self.pass1;
         pass1.add(&start);
         let start = Stopwatch::start();
-        let context = EyeContext { scene: &self.scene, plan: &self.plan, photons: photons.as_ref(), round };
+        let context = EyeContext {
+            scene: &self.scene,
+            plan: &self.plan,
+            photons: photons.as_ref(),
+            round,
+            footprints: &self.footprints,
+            film: &self.film,
+            effort: &self.effort,
+        };
         let (film, eye) = pass2_eye::trace_image(&context, control)?;
-        self.film.add_round(&film);
+        self.film.add_round(film, blocks.count as f32);
+        self.blocks = blocks.first + blocks.count;
         self.eye.add(&eye);
         for (sum, tally) in self.windows.iter_mut().zip(photons.iter().flat_map(|p| &p.tallies)) {
             sum.add(tally);
         }
         self.pass1 = pass1;
+        self.at_milestone();
         self.pass2.add(&start);
         Ok(RoundReport { rounds: self.rounds(), error: self.error_estimate(), seconds: self.seconds() })
+    }
+
+    /// The blocks of the next round: aligned, so that each is a net of its own.
+    fn next_blocks(&self) -> Blocks {
+        let count = 1 << self.effort.photon_shift;
+        Blocks { first: self.blocks.next_multiple_of(count), count }
+    }
+
+    /// Estimates the error where the number of rounds is a milestone, and decides what the next rounds do.
+    fn at_milestone(&mut self) {
+        if !is_milestone(self.rounds()) {
+            return;
+        }
+        let picture = Picture::new(&self.film, &self.footprints);
+        let errors = picture.errors();
+        let samples: Vec<u32> = self.film.pixels().iter().map(|p| p.samples).collect();
+        let sampled: u64 = samples.iter().map(|&n| 2 * u64::from(n)).sum();
+        let photon_rays: u64 = self.windows.iter().map(|t| t.rays).sum();
+        let weight = self.film.photon_weight();
+        let measured = Measured {
+            errors: &errors,
+            width: self.film.size().0,
+            samples: &samples,
+            photon_weight: weight,
+            rays_per_block: if weight > 0.0 { photon_rays as f32 / weight } else { 0.0 },
+            rays_per_sample: (self.eye.eye_rays + self.eye.shadow_rays) as f32 / sampled.max(1) as f32,
+        };
+        let key = hash(self.scene.render.seed, u64::from(self.rounds()));
+        self.effort = Effort::decide(&measured, self.plan.most_photon_shift(), key);
+        self.error = picture.error_estimate();
+        self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));
     }
 
     /// Why the render is finished; `None` while it is not.
@@ -229,6 +307,7 @@ impl Render {
         }
         if let (Some(target), Some(error)) = (stop.error, self.error_estimate())
             && self.rounds() >= LEAST_ROUNDS
+            && is_milestone(self.rounds())
             && error <= target
         {
             return Some(StopReason::Error);
@@ -260,10 +339,10 @@ impl Render {
         self.film.rounds()
     }
 
-    /// Estimated relative error so far (see [`Film::error_estimate`]).
+    /// Estimated relative error at the last milestone (see [`Picture::error_estimate`]).
     #[must_use]
     pub fn error_estimate(&self) -> Option<f32> {
-        self.film.error_estimate()
+        self.error
     }
 
     /// Seconds spent in [`Render::run_round`].
@@ -275,13 +354,24 @@ impl Render {
     /// The picture so far.
     #[must_use]
     pub fn image(&self) -> LinearImage {
-        self.film.image()
+        self.picture().image()
+    }
+
+    /// The smoothed picture so far, from which image and layers can be had without smoothing again.
+    #[must_use]
+    pub fn picture(&self) -> Picture<'_> {
+        match &self.smoothing {
+            Some((rounds, smoothing)) if *rounds == self.rounds() => {
+                Picture::with_smoothing(&self.film, smoothing.as_ref())
+            }
+            _ => Picture::new(&self.film, &self.footprints),
+        }
     }
 
     /// One class of paths so far; the layers add up to the picture.
     #[must_use]
     pub fn layer(&self, class: PathClass) -> LinearImage {
-        self.film.layer(class)
+        self.picture().layer(class)
     }
 
     /// The scene that is rendered.

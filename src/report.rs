@@ -32,7 +32,6 @@ pub fn plan_json(scene: &Scene, plan: &Plan) -> Value {
         "decisions": decisions,
         "warnings": warnings,
         "windows": windows,
-        "eye_samples_per_round": 2 * plan.eye_samples,
         "memory_bytes": plan.memory_bytes,
     })
 }

@@ -37,18 +37,27 @@ pub struct RoundPhotons {
     pub tallies: Vec<Tally>,
 }
 
-/// Traces round `round`'s block of each window's two scrambled sequences.
+/// Which points of the windows' sequences a round takes, in blocks of the plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Blocks {
+    /// Blocks to leave out: earlier rounds had them. A multiple of the count.
+    pub first: u32,
+    /// Number of blocks, a power of two.
+    pub count: u32,
+}
+
+/// Traces a round's blocks of each window's two scrambled sequences.
 ///
 /// # Errors
 /// [`RenderError::Cancelled`] if the control says so.
 pub fn emit_photons(
     scene: &Scene,
     budgets: &[Budget],
-    round: u32,
+    blocks: Blocks,
     control: &Control,
 ) -> Result<RoundPhotons, RenderError> {
     let (halves, tallies): (Vec<_>, Vec<_>) = (0..2)
-        .map(|half| emit_half(scene, budgets, round, half, control))
+        .map(|half| emit_half(scene, budgets, blocks, half, control))
         .collect::<Result<Vec<_>, _>>()?
         .into_iter()
         .unzip();
@@ -65,16 +74,16 @@ pub fn emit_photons(
 fn emit_half(
     scene: &Scene,
     budgets: &[Budget],
-    round: u32,
+    blocks: Blocks,
     half: u32,
     control: &Control,
 ) -> Result<(Vec<Photon>, Vec<Tally>), RenderError> {
     let mut photons = Vec::new();
     let mut tallies = Vec::with_capacity(budgets.len());
     for (index, budget) in budgets.iter().enumerate() {
-        let count = 1_u32 << budget.log2_block;
+        let size = 1_u32 << budget.log2_block;
         let seed = window_seed(scene.render.seed, index, half);
-        let block = Block { first: round.wrapping_mul(count), count, seed };
+        let block = Block { first: blocks.first.wrapping_mul(size), count: blocks.count * size, seed };
         let (mut found, tally) = trace_block(scene, &budget.window, block, control)?;
         photons.append(&mut found);
         tallies.push(tally);

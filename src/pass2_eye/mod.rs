@@ -1,11 +1,14 @@
 //! Pass 2, `…E`: rays backward from the eye; each class of paths in its own layer.
 
 mod direct;
+mod footprint;
 mod specular;
 
+pub use footprint::{Footprint, Footprints};
 pub use specular::EyeCounts;
 
-use crate::film::{PixelSums, RoundFilm};
+use crate::effort::Effort;
+use crate::film::{Film, PixelSums, RoundFilm};
 use crate::pass1_light::RoundPhotons;
 use crate::plan::Plan;
 use crate::render::{Control, RenderError};
@@ -13,7 +16,7 @@ use crate::sampling::{SamplePoint, hash};
 use crate::scene::Scene;
 use glam::Vec2;
 use rayon::prelude::*;
-use specular::EyeWalk;
+use specular::{EyeWalk, Lookups};
 
 /// Side of the square of pixels that is one unit of parallel work; neighbouring look-ups share the cache.
 const TILE: u32 = 16;
@@ -28,6 +31,12 @@ pub struct EyeContext<'a> {
     pub photons: Option<&'a RoundPhotons>,
     /// Number of the round.
     pub round: u32,
+    /// The pixels' areas on what they show.
+    pub footprints: &'a Footprints,
+    /// The film so far: where each pixel's sequence goes on.
+    pub film: &'a Film,
+    /// Which pixels get more samples.
+    pub effort: &'a Effort,
 }
 
 /// Traces this round's eye samples of every pixel, in two independent halves.
@@ -73,7 +82,8 @@ fn trace_tile(context: &EyeContext<'_>, x: u32, y: u32) -> Result<Tile, RenderEr
     let mut pixels = Vec::with_capacity((width * height) as usize);
     for py in y..y + height {
         for px in x..x + width {
-            let sums = trace_pixel(context, &mut walk, px, py);
+            let index = py as usize * image.width as usize + px as usize;
+            let sums = trace_pixel(context, &mut walk, (px, py), index);
             if let Some(class) = sums.not_finite() {
                 return Err(RenderError::NotFinite { x: px, y: py, round: context.round, class });
             }
@@ -83,19 +93,40 @@ fn trace_tile(context: &EyeContext<'_>, x: u32, y: u32) -> Result<Tile, RenderEr
     Ok(Tile { x, y, width, pixels, counts: walk.counts })
 }
 
-/// One pixel's samples of this round in both halves, averaged per half.
-fn trace_pixel(context: &EyeContext<'_>, walk: &mut EyeWalk<'_>, x: u32, y: u32) -> PixelSums {
-    let mut sums = PixelSums::default();
-    let per_round = context.plan.eye_samples;
+/// One pixel's samples of this round in both halves. Photons are counted on the pixel's footprint; the eye
+/// samples look up what the footprint does not show, at the end of side branches or where there is no footprint.
+fn trace_pixel(
+    context: &EyeContext<'_>,
+    walk: &mut EyeWalk<'_>,
+    (x, y): (u32, u32),
+    index: usize,
+) -> PixelSums {
+    let footprint = context.footprints.get(index).filter(|_| context.photons.is_some());
+    let lookups = match footprint {
+        _ if context.photons.is_none() => Lookups::Nowhere,
+        None => Lookups::Everywhere,
+        Some(footprint) if footprint.only_way => Lookups::Nowhere,
+        Some(_) => Lookups::OffFootprint,
+    };
+    let gathering = if lookups == Lookups::Nowhere { 0 } else { 1 };
+    let first = context.film.pixels()[index].samples;
+    let count = context.effort.samples(index).max(gathering);
+    let mut sums = PixelSums { samples: count, ..PixelSums::default() };
     for half in 0..2 {
+        if let (Some(footprint), Some(photons)) = (footprint, context.photons) {
+            walk.counts.lookups += 1;
+            let flux = photons.maps[half as usize].flux_within(footprint);
+            sums.halves[half as usize].irradiance = flux / footprint.area;
+        }
         let seed = pixel_seed(context.scene.render.seed, x, y, half);
-        for i in 0..per_round {
-            let sample = SamplePoint::new(seed, context.round.wrapping_mul(per_round).wrapping_add(i));
+        for i in 0..count {
+            let sample = SamplePoint::new(seed, first.wrapping_add(i));
             let raster = Vec2::new(x as f32, y as f32) + sample.get_2d(0);
-            walk.trace(raster, half as usize, sample, &mut sums.halves[half as usize]);
+            let lookups = if i < gathering { lookups } else { Lookups::Nowhere };
+            walk.start(half as usize, sample, lookups, footprint.map(|f| f.view));
+            walk.trace(raster, &mut sums);
         }
     }
-    sums.scale(1.0 / per_round as f32);
     sums
 }
 

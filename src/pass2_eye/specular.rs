@@ -7,10 +7,11 @@
 
 use super::EyeContext;
 use super::direct::{Receiver, direct_light};
-use crate::film::ClassSums;
+use super::footprint::view_code;
+use crate::film::PixelSums;
 use crate::geometry::{Hit, Ray, offset_origin};
 use crate::light_path::PathClass;
-use crate::optics::{self, Interaction, Outcome};
+use crate::optics::{self, Event, Interaction, Outcome};
 use crate::photon_map::Lookup;
 use crate::sampling::SamplePoint;
 use crate::scene::{Light, Material, Texture};
@@ -51,6 +52,17 @@ impl EyeCounts {
     }
 }
 
+/// Where an eye sample looks photons up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lookups {
+    /// Nowhere.
+    Nowhere,
+    /// At every D that is not the pixel's footprint.
+    OffFootprint,
+    /// At every D.
+    Everywhere,
+}
+
 /// Follows eye rays; owns the stack of branches yet to follow.
 pub(super) struct EyeWalk<'a> {
     context: &'a EyeContext<'a>,
@@ -60,6 +72,8 @@ pub(super) struct EyeWalk<'a> {
     /// The eye sample that is being followed.
     half: usize,
     sample: SamplePoint,
+    lookups: Lookups,
+    view: Option<u32>,
     pub(super) counts: EyeCounts,
 }
 
@@ -73,6 +87,8 @@ struct Branch {
     travelled: f32,
     /// Which ways were taken: one bit per S, after a leading 1.
     key: u64,
+    /// The eye's main way: refracted where it can be, and never by chance.
+    main: bool,
 }
 
 impl<'a> EyeWalk<'a> {
@@ -80,25 +96,46 @@ impl<'a> EyeWalk<'a> {
         let pixels = context.plan.radius.pixels(context.round) as f32;
         let kernel_spread = context.scene.camera.pixel_spread() * pixels;
         let sample = SamplePoint::new(0, 0);
-        Self { context, kernel_spread, stack: Vec::new(), half: 0, sample, counts: EyeCounts::default() }
+        Self {
+            context,
+            kernel_spread,
+            stack: Vec::new(),
+            half: 0,
+            sample,
+            lookups: Lookups::Nowhere,
+            view: None,
+            counts: EyeCounts::default(),
+        }
+    }
+
+    /// Sets the sample that is followed next, where it looks photons up, and the view of the pixel's footprint.
+    pub(super) fn start(&mut self, half: usize, sample: SamplePoint, lookups: Lookups, view: Option<u32>) {
+        (self.half, self.sample) = (half, sample);
+        (self.lookups, self.view) = (lookups, view);
     }
 
     /// Adds what arrives along one eye ray to the classes' sums.
-    pub(super) fn trace(&mut self, raster: Vec2, half: usize, sample: SamplePoint, sums: &mut ClassSums) {
+    pub(super) fn trace(&mut self, raster: Vec2, sums: &mut PixelSums) {
         let ray = self.context.scene.camera.ray(raster);
-        (self.half, self.sample) = (half, sample);
         self.stack.clear();
-        self.stack.push(Branch { ray, throughput: Vec3::ONE, bounces: 0, travelled: 0.0, key: 1 });
+        self.stack.push(Branch {
+            ray,
+            throughput: Vec3::ONE,
+            bounces: 0,
+            travelled: 0.0,
+            key: 1,
+            main: true,
+        });
         while let Some(branch) = self.stack.pop() {
             self.follow(branch, sums);
         }
     }
 
-    fn follow(&mut self, branch: Branch, sums: &mut ClassSums) {
+    fn follow(&mut self, branch: Branch, sums: &mut PixelSums) {
         let scene = self.context.scene;
         self.counts.eye_rays += 1;
         let Some(hit) = scene.geometry.closest_hit(&branch.ray) else {
-            sums.add(PathClass::Emitted, branch.throughput * scene.environment);
+            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * scene.environment);
             return;
         };
         match scene.material_of(hit.object) {
@@ -125,21 +162,22 @@ impl<'a> EyeWalk<'a> {
             (Some(a), Some(b)) => {
                 let weight = |o: &Outcome| (branch.throughput * o.fraction).max_element();
                 if weight(&a).min(weight(&b)) >= SPLIT_ABOVE {
-                    self.push(branch, hit, &b, 1.0);
-                    self.push(branch, hit, &a, 1.0);
+                    self.push(branch, hit, &b, 1.0, branch.main);
+                    self.push(branch, hit, &a, 1.0, false);
                     return;
                 }
                 let share = weight(&a) / (weight(&a) + weight(&b));
                 let u = self.sample.branch(branch.key).get(dimension);
                 let (outcome, probability) = if u < share { (a, share) } else { (b, 1.0 - share) };
-                self.push(branch, hit, &outcome, probability);
+                let main = branch.main && outcome.event == Event::Refraction;
+                self.push(branch, hit, &outcome, probability, main);
             }
-            (Some(only), None) | (None, Some(only)) => self.push(branch, hit, &only, 1.0),
+            (Some(only), None) | (None, Some(only)) => self.push(branch, hit, &only, 1.0, branch.main),
             (None, None) => {}
         }
     }
 
-    fn push(&mut self, branch: &Branch, hit: &Hit, outcome: &Outcome, probability: f32) {
+    fn push(&mut self, branch: &Branch, hit: &Hit, outcome: &Outcome, probability: f32, main: bool) {
         let mut throughput = branch.throughput * outcome.fraction * (outcome.radiance_scale / probability);
         let strength = throughput.max_element();
         if strength < ROULETTE_BELOW {
@@ -152,25 +190,25 @@ impl<'a> EyeWalk<'a> {
         }
         let surface = &hit.surface;
         let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
-        let way = u64::from(outcome.event == optics::Event::Refraction);
         self.stack.push(Branch {
             ray: Ray::new(origin, outcome.direction),
             throughput,
             bounces: branch.bounces + 1,
             travelled: branch.travelled + hit.t,
-            key: branch.key << 1 | way,
+            key: outcome.extend_key(branch.key),
+            main,
         });
     }
 
     /// At a D: what it emits, the direct light and the photons.
-    fn arrive(&mut self, branch: &Branch, hit: &Hit, albedo: &Texture, sums: &mut ClassSums) {
+    fn arrive(&mut self, branch: &Branch, hit: &Hit, albedo: &Texture, sums: &mut PixelSums) {
         let scene = self.context.scene;
         let backside = branch.ray.direction.dot(hit.surface.normal) > 0.0;
         if let Some(light) = scene.objects[hit.object.index()].emitter
             && !backside
             && let Light::Quad(quad) = &scene.lights[light.index()]
         {
-            sums.add(PathClass::Emitted, branch.throughput * quad.radiance);
+            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * quad.radiance);
         }
         let albedo = albedo.eval(hit.surface.uv);
         if albedo == Vec3::ZERO {
@@ -182,16 +220,32 @@ impl<'a> EyeWalk<'a> {
         let receiver = Receiver { surface: &hit.surface, normal };
         let sample = self.sample.branch(branch.key);
         let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
-        sums.add(PathClass::Direct, weight * direct);
-        if let Some(photons) = self.context.photons {
-            let radius = (branch.travelled + hit.t) * self.kernel_spread;
-            let lookup = Lookup { point: hit.surface.point, normal, sheet: hit.sheet, radius };
-            self.counts.lookups += 1;
-            let caustic = photons.maps[self.half].irradiance(&lookup).value;
-            if caustic != Vec3::ZERO {
-                let mass = scene.geometry.kernel_mass(hit.sheet, hit.surface.point, radius);
-                sums.add(PathClass::Caustic, weight * caustic / mass);
+        sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);
+        let footprint = branch.main && self.view == Some(view_code(hit.sheet, branch.key));
+        if footprint {
+            sums.gain += weight;
+        }
+        match self.lookups {
+            Lookups::Nowhere => {}
+            Lookups::OffFootprint if footprint => {}
+            Lookups::OffFootprint | Lookups::Everywhere => {
+                let caustic = self.look_up(branch, hit, normal);
+                sums.halves[self.half].classes.add(PathClass::Caustic, weight * caustic);
             }
         }
+    }
+
+    /// Irradiance by density estimation around the point, with a kernel of about a pixel.
+    fn look_up(&mut self, branch: &Branch, hit: &Hit, normal: Vec3) -> Vec3 {
+        let Some(photons) = self.context.photons else { return Vec3::ZERO };
+        let radius = (branch.travelled + hit.t) * self.kernel_spread;
+        let point = hit.surface.point;
+        let lookup = Lookup { point, normal, sheet: hit.sheet, radius };
+        self.counts.lookups += 1;
+        let irradiance = photons.maps[self.half].irradiance(&lookup).value;
+        if irradiance == Vec3::ZERO {
+            return irradiance;
+        }
+        irradiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius)
     }
 }

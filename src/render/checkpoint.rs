@@ -39,6 +39,13 @@ impl Render {
         for tally in &self.windows {
             put_tally(&mut out, tally);
         }
+        for count in [self.blocks, self.effort.photon_shift, self.effort.samples.len() as u32] {
+            out.extend(count.to_le_bytes());
+        }
+        out.extend(&self.effort.samples);
+        // A non-negative float's bits plus one: zero means none.
+        let error = self.error.map_or(0, |e| e.to_bits() + 1);
+        out.extend(error.to_le_bytes());
         out.extend(self.film.to_bytes());
         out
     }
@@ -72,6 +79,13 @@ impl Render {
             *tally = take_tally(&mut bytes)?;
         }
         let image = self.scene.image;
+        self.blocks = take_u32(&mut bytes)?;
+        self.effort.photon_shift = take_u32(&mut bytes)?.min(self.plan.most_photon_shift());
+        let pixels = take_u32(&mut bytes)? as usize;
+        let (counts, rest) = bytes.split_at_checked(pixels)?;
+        self.effort.samples = counts.to_vec();
+        bytes = rest;
+        self.error = take_u32(&mut bytes)?.checked_sub(1).map(f32::from_bits);
         self.film = Film::from_bytes(image.width, image.height, bytes)?;
         Some(())
     }
@@ -89,6 +103,12 @@ fn take_u64(bytes: &mut &[u8]) -> Option<u64> {
     let (value, rest) = bytes.split_first_chunk::<8>()?;
     *bytes = rest;
     Some(u64::from_le_bytes(*value))
+}
+
+fn take_u32(bytes: &mut &[u8]) -> Option<u32> {
+    let (value, rest) = bytes.split_first_chunk::<4>()?;
+    *bytes = rest;
+    Some(u32::from_le_bytes(*value))
 }
 
 fn take_f64(bytes: &mut &[u8]) -> Option<f64> {

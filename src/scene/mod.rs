@@ -158,7 +158,7 @@ pub struct RenderSettings {
 /// When a render ends: the first limit that is reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// Estimated relative error of the picture (see [`crate::film::Film::error_estimate`]).
+    /// Estimated relative error of the picture (see [`crate::picture::Picture`]).
     pub error: Option<f32>,
     /// Seconds of wall-clock time spent rendering.
     pub seconds: Option<f64>,

@@ -1,5 +1,7 @@
 //! One binary for all tests of the renderer.
 
+#![expect(clippy::unwrap_used, reason = "a failed helper fails its test")]
+
 mod caustics;
 mod determinism;
 mod direct_light;

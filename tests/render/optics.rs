@@ -51,7 +51,7 @@ fn f15_reflection_keeps_length_for_either_sign_of_the_normal() {
 /// T9: unpolarised reflectance of n = 1.5 from outside.
 #[test]
 fn t9_fresnel_from_outside() {
-    let table = [
+    let table: [(f64, f32); 8] = [
         (0.0, 0.04),
         (30.0, 0.041_523),
         (45.0, 0.050_240),
@@ -62,7 +62,7 @@ fn t9_fresnel_from_outside() {
         (89.0, 0.904_185),
     ];
     for (degrees, expected) in table {
-        let r = fresnel((degrees as f64).to_radians().cos() as f32, 1.0 / 1.5);
+        let r = fresnel(degrees.to_radians().cos() as f32, 1.0 / 1.5);
         assert!((r - expected).abs() < 1e-6, "{degrees}: {r}");
     }
 }
@@ -78,7 +78,7 @@ fn t10_fresnel_from_inside() {
         (41.82, 1.0, 0.0),
         (80.0, 1.0, 0.0),
     ] {
-        let r = fresnel((degrees as f64).to_radians().cos() as f32, 1.5);
+        let r = fresnel(f64::to_radians(degrees).cos() as f32, 1.5);
         assert!((r - expected).abs() <= tolerance, "{degrees}: {r}");
     }
 }

@@ -1,0 +1,15 @@
+.PHONY: serve test browser
+
+# Builds and starts the service on http://127.0.0.1:8080; settings as flags, e.g. `make serve ARGS="--threads 4"`.
+serve:
+	cargo run --release --package nephroid-api -- $(ARGS)
+
+test: browser
+	cargo test --workspace
+
+# The tests of the web page need a browser and its driver.
+browser:
+	@command -v chromium >/dev/null && command -v chromedriver >/dev/null || { \
+		if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; \
+		then apt-get update && apt-get install -y chromium chromium-driver; \
+		else echo "make test: chromium and chromedriver are missing (Debian: apt-get install chromium chromium-driver)" >&2; exit 1; fi; }

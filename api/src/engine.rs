@@ -1,0 +1,287 @@
+//! The joint to the renderer: the only file that names the `nephroid` crate.
+
+use crate::samples;
+use nephroid::image_io::{encode_exr, encode_png};
+use nephroid::light_path::PathClass;
+use nephroid::plan::Plan;
+use nephroid::render::{Render, RenderError};
+use nephroid::report;
+use nephroid::scene::assets::{AssetError, AssetSource};
+use nephroid::scene::{ImageSettings, Scene, SceneIssue};
+use serde_json::Value;
+use std::borrow::Cow;
+use std::sync::Arc;
+
+pub use nephroid::image_io::LinearImage;
+pub use nephroid::render::Control;
+
+/// One thing that is wrong with a scene, and where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Issue {
+    /// JSON pointer (RFC 6901) to the place.
+    pub pointer: String,
+    /// Stable name of what is wrong.
+    pub code: String,
+    /// One sentence.
+    pub detail: String,
+    /// Line and column in the text, from 1; `None` where unknown.
+    pub place: Option<[usize; 2]>,
+}
+
+/// A scene that can be rendered.
+#[derive(Clone, Debug)]
+pub struct LoadedScene {
+    scene: Arc<Scene>,
+    /// The longest rendering time that the scene itself asks for.
+    pub asked_seconds: Option<f64>,
+}
+
+impl LoadedScene {
+    /// Reads and checks a scene; on failure everything that is wrong with it. However it asks to end,
+    /// it ends after `max_seconds` of rendering.
+    pub fn read(text: &str, max_seconds: f64) -> Result<Self, Vec<Issue>> {
+        let read = Scene::from_json(text, &SampleAssets);
+        let mut scene = read.map_err(|errors| errors.issues.into_iter().map(issue_of).collect::<Vec<_>>())?;
+        let stop = &mut scene.render.stop;
+        let asked_seconds = stop.seconds;
+        stop.seconds = Some(asked_seconds.map_or(max_seconds, |asked| asked.min(max_seconds)));
+        Ok(Self { scene: Arc::new(scene), asked_seconds })
+    }
+
+    /// The scene's own name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.scene.name
+    }
+
+    /// Pixels across and down.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        [self.scene.image.width, self.scene.image.height]
+    }
+
+    /// What will be run for it. Takes up to a second.
+    #[must_use]
+    pub fn plan(&self) -> PlannedScene {
+        PlannedScene { plan: Plan::new(&self.scene), scene: Arc::clone(&self.scene) }
+    }
+}
+
+/// The files that come with the samples.
+struct SampleAssets;
+
+impl AssetSource for SampleAssets {
+    fn read(&self, name: &str) -> Result<Cow<'_, [u8]>, AssetError> {
+        samples::asset(name).map(Cow::Borrowed).ok_or_else(|| AssetError::NotFound(name.to_owned()))
+    }
+}
+
+fn issue_of(issue: SceneIssue) -> Issue {
+    let place = (issue.line > 0).then_some([issue.line, issue.column]);
+    Issue { pointer: issue.pointer, code: issue.code.as_str().into(), detail: issue.message, place }
+}
+
+/// A scene, and what will be run for it.
+#[derive(Debug)]
+pub struct PlannedScene {
+    scene: Arc<Scene>,
+    plan: Plan,
+}
+
+impl PlannedScene {
+    /// Every decision with its reason, as JSON.
+    #[must_use]
+    pub fn report(&self) -> Value {
+        report::plan_json(&self.scene, &self.plan)
+    }
+
+    /// Memory that the render will need.
+    #[must_use]
+    pub fn memory_bytes(&self) -> u64 {
+        self.plan.memory_bytes
+    }
+
+    /// Begins the render, from a checkpoint if there is one that fits.
+    #[must_use]
+    pub fn begin(self, checkpoint: Option<&[u8]>) -> RunningRender {
+        let Self { scene, plan } = self;
+        let settings = scene.image;
+        let resumed = checkpoint.and_then(|checkpoint| {
+            Render::resume(Arc::clone(&scene), plan.clone(), checkpoint)
+                .inspect_err(
+                    |error| tracing::warn!(%error, "a checkpoint does not fit; the render starts anew"),
+                )
+                .ok()
+        });
+        let render = resumed.unwrap_or_else(|| Render::new(scene, plan));
+        RunningRender { render, settings }
+    }
+}
+
+/// Why a round did not finish.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RoundError {
+    /// It was told to stop.
+    Cancelled,
+    /// The renderer found its own result wrong.
+    Failed {
+        /// Stable name of the reason.
+        code: &'static str,
+        /// One sentence.
+        detail: String,
+    },
+}
+
+/// A picture that a finished render leaves.
+#[derive(Debug)]
+pub struct Output {
+    /// Its path below the job.
+    pub name: String,
+    /// The file.
+    pub bytes: Vec<u8>,
+}
+
+/// A render between two rounds.
+pub struct RunningRender {
+    render: Render,
+    settings: ImageSettings,
+}
+
+impl RunningRender {
+    /// Runs one round on the thread pool that this is called in.
+    pub fn run_round(&mut self, control: &Control) -> Result<(), RoundError> {
+        match self.render.run_round(control) {
+            Ok(_) => Ok(()),
+            Err(RenderError::Cancelled) => Err(RoundError::Cancelled),
+            Err(error @ RenderError::NotFinite { .. }) => {
+                Err(RoundError::Failed { code: "not_finite", detail: error.to_string() })
+            }
+        }
+    }
+
+    /// Which limit ended the render, once one has.
+    #[must_use]
+    pub fn stop_reason(&self) -> Option<&'static str> {
+        self.render.stop_reason().map(|reason| reason.as_str())
+    }
+
+    /// Rounds that are finished.
+    #[must_use]
+    pub fn rounds(&self) -> u32 {
+        self.render.rounds()
+    }
+
+    /// Estimated error after those.
+    #[must_use]
+    pub fn error_estimate(&self) -> Option<f32> {
+        self.render.error_estimate().filter(|error| error.is_finite())
+    }
+
+    /// Time spent in rounds.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.render.seconds()
+    }
+
+    /// From 0 to 1, a guess from the rule that will end the render.
+    #[must_use]
+    pub fn progress(&self) -> f32 {
+        self.render.progress()
+    }
+
+    /// All it takes to go on from here in another process, to the same bytes.
+    #[must_use]
+    pub fn checkpoint(&self) -> Vec<u8> {
+        self.render.checkpoint()
+    }
+
+    /// The picture after the finished rounds.
+    #[must_use]
+    pub fn picture(&self) -> Picture {
+        Picture { image: self.render.image(), settings: self.settings }
+    }
+
+    /// What the render counted, as JSON.
+    #[must_use]
+    pub fn stats(&self) -> Value {
+        report::stats_json(&self.render)
+    }
+
+    /// The pictures of a finished render.
+    pub fn outputs(&self) -> Result<Vec<Output>, String> {
+        let picture = self.render.picture();
+        let image = picture.image();
+        let mut outputs = vec![
+            Output { name: "image.png".into(), bytes: self.png(&image)? },
+            Output {
+                name: "image.exr".into(),
+                bytes: encode_exr(&image).map_err(|error| error.to_string())?,
+            },
+        ];
+        for class in PathClass::ALL {
+            let bytes = self.png(&picture.layer(class))?;
+            outputs.push(Output { name: format!("layers/{}.png", class.name()), bytes });
+        }
+        Ok(outputs)
+    }
+
+    fn png(&self, image: &LinearImage) -> Result<Vec<u8>, String> {
+        encode_png(image, &self.settings).map_err(|error| error.to_string())
+    }
+}
+
+/// A picture that is not encoded yet.
+#[derive(Debug)]
+pub struct Picture {
+    image: LinearImage,
+    settings: ImageSettings,
+}
+
+impl Picture {
+    /// The picture as PNG, exposed and toned as the scene says.
+    pub fn to_png(&self) -> Result<Vec<u8>, String> {
+        encode_png(&self.image, &self.settings).map_err(|error| error.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn begin(checkpoint: Option<&[u8]>) -> RunningRender {
+        let sample = samples::find("glass-ball").expect("it is embedded");
+        let mut scene: Value = serde_json::from_str(sample.text).expect("it is JSON");
+        scene["image"]["width"] = 32.into();
+        scene["image"]["height"] = 24.into();
+        let scene = LoadedScene::read(&scene.to_string(), 60.0).expect("it is a scene");
+        scene.plan().begin(checkpoint)
+    }
+
+    #[test]
+    fn a_checkpoint_goes_on_to_the_same_bytes() {
+        let control = Control::default();
+        let mut straight = begin(None);
+        (0..3).for_each(|_| straight.run_round(&control).expect("nothing stops it"));
+        let mut first = begin(None);
+        (0..2).for_each(|_| first.run_round(&control).expect("nothing stops it"));
+        let mut resumed = begin(Some(&first.checkpoint()));
+        assert_eq!(resumed.rounds(), 2, "finished rounds are not made again");
+        resumed.run_round(&control).expect("nothing stops it");
+        assert!(resumed.picture().to_png() == straight.picture().to_png());
+    }
+
+    #[test]
+    fn a_checkpoint_that_does_not_fit_is_not_used() {
+        assert_eq!(begin(Some(b"something else")).rounds(), 0);
+    }
+
+    #[test]
+    fn a_round_that_is_stopped_leaves_the_finished_ones() {
+        let mut render = begin(None);
+        render.run_round(&Control::default()).expect("nothing stops it");
+        let stop = Control::default();
+        stop.cancel();
+        assert_eq!(render.run_round(&stop), Err(RoundError::Cancelled));
+        assert_eq!(render.rounds(), 1);
+    }
+}

@@ -1,0 +1,140 @@
+//! What is known of running jobs between two writes to the database: progress, preview, the stop signal.
+
+use super::JobId;
+use crate::engine::{Control, Picture};
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use tokio::sync::broadcast;
+
+/// Changes that a slow listener may fall behind before it is told to look again.
+const BACKLOG: usize = 256;
+
+/// Something about this job is new: look again. A hint, never the news itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Change(pub JobId);
+
+/// How far a render is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Progress {
+    /// From 0 to 1, a guess from the rule that will end the render.
+    pub fraction: f32,
+    /// Rounds that are finished.
+    pub rounds: u32,
+    /// Estimated error after those.
+    pub error_estimate: Option<f32>,
+}
+
+/// One running job.
+#[derive(Debug, Default)]
+pub(super) struct Live {
+    /// Stops the round that runs.
+    pub(super) control: Control,
+    state: Mutex<LiveState>,
+}
+
+#[derive(Debug, Default)]
+struct LiveState {
+    progress: Progress,
+    /// What the latest round added to the fraction: the guess for the one that runs.
+    last_step: f32,
+    preview: Option<Arc<Preview>>,
+}
+
+/// The picture after some rounds; encoded at most once, and only if somebody looks.
+#[derive(Debug)]
+pub(super) struct Preview {
+    picture: Picture,
+    png: OnceLock<Option<Arc<[u8]>>>,
+}
+
+impl Live {
+    pub(super) fn round_finished(&self, progress: Progress) {
+        let mut state = lock(&self.state);
+        state.last_step = (progress.fraction - state.progress.fraction).max(0.0);
+        state.progress = progress;
+    }
+
+    pub(super) fn show(&self, picture: Picture) {
+        lock(&self.state).preview = Some(Arc::new(Preview { picture, png: OnceLock::new() }));
+    }
+
+    pub(super) fn preview(&self) -> Option<Arc<Preview>> {
+        lock(&self.state).preview.clone()
+    }
+
+    /// How far it is by now, the round that runs included.
+    pub(super) fn progress(&self) -> Progress {
+        let state = lock(&self.state);
+        let guess = state.last_step * self.control.round_fraction();
+        Progress { fraction: (state.progress.fraction + guess).clamp(0.0, 1.0), ..state.progress }
+    }
+}
+
+impl Preview {
+    /// The PNG; `None` if it cannot be encoded. Takes milliseconds the first time.
+    pub(super) fn png(&self) -> Option<Arc<[u8]>> {
+        self.png.get_or_init(|| self.picture.to_png().ok().map(Arc::from)).clone()
+    }
+}
+
+/// All running jobs, and the place where changes are called out.
+#[derive(Debug)]
+pub(super) struct Registry {
+    jobs: Mutex<HashMap<JobId, Arc<Live>>>,
+    changes: broadcast::Sender<Change>,
+    draining: AtomicBool,
+}
+
+impl Default for Registry {
+    fn default() -> Self {
+        let (changes, _) = broadcast::channel(BACKLOG);
+        Self { jobs: Mutex::default(), changes, draining: AtomicBool::new(false) }
+    }
+}
+
+impl Registry {
+    pub(super) fn enter(&self, id: JobId) -> Arc<Live> {
+        let live = Arc::new(Live::default());
+        let mut jobs = lock(&self.jobs);
+        jobs.insert(id, Arc::clone(&live));
+        // Under the lock: either `drain` finds this job in the map, or it is seen here.
+        if self.is_draining() {
+            live.control.cancel();
+        }
+        live
+    }
+
+    pub(super) fn leave(&self, id: JobId) {
+        lock(&self.jobs).remove(&id);
+        self.announce(id);
+    }
+
+    pub(super) fn get(&self, id: JobId) -> Option<Arc<Live>> {
+        lock(&self.jobs).get(&id).cloned()
+    }
+
+    pub(super) fn announce(&self, id: JobId) {
+        // Nobody may be listening; that is fine.
+        drop(self.changes.send(Change(id)));
+    }
+
+    pub(super) fn listen(&self) -> broadcast::Receiver<Change> {
+        self.changes.subscribe()
+    }
+
+    /// Stops every round that runs, so that the jobs can be put aside.
+    pub(super) fn drain(&self) {
+        self.draining.store(true, Ordering::SeqCst);
+        lock(&self.jobs).values().for_each(|live| live.control.cancel());
+    }
+
+    pub(super) fn is_draining(&self) -> bool {
+        self.draining.load(Ordering::SeqCst)
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What is kept here is whole after every statement: a panic elsewhere does not spoil it.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

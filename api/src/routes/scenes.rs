@@ -1,0 +1,38 @@
+//! `/v1/scenes`: the sample scenes.
+
+use super::renders::json_response;
+use crate::problem::Problem;
+use crate::samples;
+use crate::wire::SampleView;
+use axum::extract::Path;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde_json::json;
+
+/// `GET /v1/scenes`
+pub(super) async fn list_scenes() -> Response {
+    let view = |sample: samples::Sample| SampleView {
+        name: sample.name.into(),
+        title: sample.title(),
+        href: format!("/v1/scenes/{}", sample.name),
+        picture: sample.picture().map(|_| format!("/v1/scenes/{}/picture.png", sample.name)),
+    };
+    json_response(StatusCode::OK, &json!({ "scenes": samples::all().map(view).collect::<Vec<_>>() }))
+}
+
+/// `GET /v1/scenes/{name}`
+pub(super) async fn get_scene(Path(name): Path<String>) -> Result<Response, Problem> {
+    let sample = samples::find(name.trim_end_matches(".json")).ok_or_else(unknown)?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], sample.text).into_response())
+}
+
+/// `GET /v1/scenes/{name}/picture.png`
+pub(super) async fn get_scene_picture(Path(name): Path<String>) -> Result<Response, Problem> {
+    let picture = samples::find(&name).and_then(|sample| sample.picture()).ok_or_else(unknown)?;
+    let head = [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "max-age=3600")];
+    Ok((head, picture).into_response())
+}
+
+fn unknown() -> Problem {
+    Problem::not_found("There is no sample scene of this name.")
+}

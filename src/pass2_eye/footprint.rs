@@ -1,0 +1,180 @@
+//! Pass 2, `DS*E`: the area of each pixel on the surface that the eye's main way leads to.
+//!
+//! A pixel's share of a caustic is the light that falls on its footprint. The pixels' corners are traced once
+//! along the main way, refracted where that is possible; the four landing points of a pixel bound its footprint,
+//! and neighbours share them, so that every photon falls on exactly one pixel: nothing is blurred, and the even
+//! spacing of low-discrepancy photons is not lost to random places of looking.
+
+use crate::geometry::{Hit, Ray, SheetId, offset_origin};
+use crate::optics::{self, Interaction};
+use crate::sampling::hash;
+use crate::scene::{Material, Scene};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// The footprints of all pixels, row by row; `None` where a pixel's corners do not reach one smooth piece of
+/// surface.
+#[derive(Debug, Default)]
+pub struct Footprints {
+    width: usize,
+    pixels: Vec<Option<Footprint>>,
+}
+
+/// Where a pixel's corners land.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    /// Landing points, in order around the pixel.
+    pub corners: [Vec3; 4],
+    /// Unit normal on the side that is seen.
+    pub normal: Vec3,
+    /// The sheet of surface.
+    pub sheet: SheetId,
+    /// Sheet and way there; see [`view_code`].
+    pub view: u32,
+    /// Area, m².
+    pub area: f32,
+    /// True if the eye's ray does not split on the way: the main way is the only one.
+    pub only_way: bool,
+}
+
+/// Where one ray of the main way ends.
+#[derive(Clone, Copy)]
+struct Landing {
+    point: Vec3,
+    normal: Vec3,
+    sheet: SheetId,
+    key: u64,
+    only_way: bool,
+}
+
+/// Names a sheet seen by certain reflections and refractions. A wall seen through water and the same wall above
+/// it are two views.
+#[must_use]
+pub(super) fn view_code(sheet: SheetId, way: u64) -> u32 {
+    hash(u64::from(sheet.0), way) as u32
+}
+
+/// More S than this on the main way, and a pixel is gathered point by point.
+const MOST_BOUNCES: u32 = 16;
+
+/// Corners whose normals differ by more than this lie on different faces (cosine of 18°).
+const SAME_FACE: f32 = 0.95;
+
+/// How far the pixel's middle may land from the middle of its corners, as a fraction of the footprint's
+/// diagonal, for the corners to tell where its light falls.
+const STRAIGHTNESS: f32 = 0.1;
+
+impl Footprints {
+    /// Traces the corners of all pixels.
+    #[must_use]
+    pub fn trace(scene: &Scene) -> Self {
+        let (width, height) = (scene.image.width as usize, scene.image.height as usize);
+        let corners: Vec<Vec<Option<Landing>>> = (0..=height)
+            .into_par_iter()
+            .map(|y| (0..=width).map(|x| land(scene, Vec2::new(x as f32, y as f32))).collect())
+            .collect();
+        let rows: Vec<Vec<Option<Footprint>>> = (0..height)
+            .into_par_iter()
+            .map(|y| {
+                let (above, below) = (&corners[y], &corners[y + 1]);
+                let pixel = |x: usize| {
+                    let around = [above[x]?, above[x + 1]?, below[x + 1]?, below[x]?];
+                    Footprint::between(scene, &around, Vec2::new(x as f32 + 0.5, y as f32 + 0.5))
+                };
+                (0..width).map(pixel).collect()
+            })
+            .collect();
+        Self { width, pixels: rows.concat() }
+    }
+
+    /// A pixel's footprint.
+    #[inline]
+    #[must_use]
+    pub fn get(&self, index: usize) -> Option<&Footprint> {
+        self.pixels.get(index)?.as_ref()
+    }
+
+    /// Number of pixels, and pixels across.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        (self.pixels.len(), self.width)
+    }
+
+    /// Bytes per pixel.
+    pub const BYTES_PER_PIXEL: u64 = size_of::<Option<Footprint>>() as u64;
+}
+
+impl Footprint {
+    fn between(scene: &Scene, around: &[Landing; 4], middle: Vec2) -> Option<Self> {
+        let first = around[0];
+        let alike = |l: &Landing| {
+            l.sheet == first.sheet && l.key == first.key && l.normal.dot(first.normal) > SAME_FACE
+        };
+        if !around.iter().all(alike) {
+            return None;
+        }
+        let corners = around.map(|l| l.point);
+        let normal = around.iter().map(|l| l.normal).sum::<Vec3>().normalize();
+        let turn = |i: usize| {
+            let (a, b, c) = (corners[i], corners[(i + 1) % 4], corners[(i + 2) % 4]);
+            (b - a).cross(c - b).dot(normal)
+        };
+        let turns = [turn(0), turn(1), turn(2), turn(3)];
+        let convex = turns.iter().all(|t| *t > 0.0) || turns.iter().all(|t| *t < 0.0);
+        let diagonals = (corners[2] - corners[0]).cross(corners[3] - corners[1]);
+        let area = 0.5 * diagonals.dot(normal).abs();
+        if !convex || area <= 0.0 || area.is_nan() {
+            return None;
+        }
+        if first.key != 1 {
+            let landing = land(scene, middle)?;
+            let center = corners.iter().sum::<Vec3>() / 4.0;
+            let diagonal = (corners[2] - corners[0]).length().max((corners[3] - corners[1]).length());
+            let straight = (landing.point - center).length() <= STRAIGHTNESS * diagonal;
+            if !alike(&landing) || !straight {
+                return None;
+            }
+        }
+        let only_way = around.iter().all(|l| l.only_way);
+        let view = view_code(first.sheet, first.key);
+        Some(Self { corners, normal, sheet: first.sheet, view, area, only_way })
+    }
+
+    /// Middle of the corners.
+    #[must_use]
+    pub fn center(&self) -> Vec3 {
+        self.corners.iter().sum::<Vec3>() / 4.0
+    }
+}
+
+/// Follows the main way from a raster position to a D.
+fn land(scene: &Scene, raster: Vec2) -> Option<Landing> {
+    let mut ray = scene.camera.ray(raster);
+    let mut key = 1_u64;
+    let mut only_way = true;
+    for _ in 0..MOST_BOUNCES {
+        let hit = scene.geometry.closest_hit(&ray)?;
+        let Some(interaction) = interact(scene, &ray, &hit) else {
+            let surface = &hit.surface;
+            let backside = ray.direction.dot(surface.normal) > 0.0;
+            let normal = if backside { -surface.normal } else { surface.normal };
+            return Some(Landing { point: surface.point, normal, sheet: hit.sheet, key, only_way });
+        };
+        only_way &= interaction.reflected.is_none() || interaction.refracted.is_none();
+        let outcome = interaction.refracted.or(interaction.reflected)?;
+        key = outcome.extend_key(key);
+        let surface = &hit.surface;
+        let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
+        ray = Ray::new(origin, outcome.direction);
+    }
+    None
+}
+
+/// What the surface does if it is an S.
+fn interact(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<Interaction> {
+    match scene.material_of(hit.object) {
+        Material::Diffuse { .. } => None,
+        Material::Mirror { reflectance } => Some(optics::mirror(ray.direction, &hit.surface, *reflectance)),
+        Material::Glass { ior } => Some(optics::glass(ray.direction, &hit.surface, *ior)),
+    }
+}

@@ -1,0 +1,89 @@
+//! How wide the caustics are smoothed at the end: per pixel, as the two halves of the film advise.
+//!
+//! Photons are gathered over about a pixel, so that what is sharp stays sharp; where a caustic is smooth,
+//! that leaves noise which its neighbours on the same surface could take away. Each segment of the picture
+//! that shows one smooth piece of surface has its irradiance filtered at a ladder of widths. Halves A and B
+//! are independent, so that (A_l - A_k)(B_l - B_k) estimates what width l blurs away beyond width k and
+//! (A_l - B_l)²/4 the noise it leaves, both without bias; the width with the least sum is taken, from large
+//! windows to small, a smaller window overruling only where it promises clearly less error.
+//!
+//! The main way of the eye through mirrors and glass is smoothed only; its fainter branches stay as they are.
+
+mod ladder;
+mod segment;
+
+use crate::film::{Film, PixelMeans};
+use crate::pass2_eye::Footprints;
+use glam::Vec3;
+use ladder::Ladder;
+use rayon::prelude::*;
+use segment::Segment;
+
+/// What smoothing adds to the film.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Smoothing {
+    /// Radiance to add to each pixel's caustic layer.
+    pub correction: Vec<Vec3>,
+    /// Estimated squared error of the caustic radiance that is left, mean over channels; `None` where the
+    /// pixel stays as it was gathered.
+    pub squared_error: Vec<Option<f32>>,
+}
+
+/// Segments with fewer pixels tell too little about noise and blur.
+const LEAST_PIXELS: usize = 64;
+
+/// A pixel as smoothing sees it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sample {
+    /// Irradiance in each half.
+    irradiance: [Vec3; 2],
+    /// Radiance per irradiance.
+    gain: Vec3,
+    /// Radiance of everything else.
+    rest: Vec3,
+}
+
+/// Decides the widths and filters; `None` if the film holds no photons.
+#[must_use]
+pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
+    let samples: Vec<Sample> = film.means().map(|means| Sample::of(&means)).collect();
+    if samples.iter().all(|s| s.irradiance == [Vec3::ZERO; 2]) {
+        return None;
+    }
+    let sum: f32 = film.means().map(|means| mean_channel(means.total())).sum();
+    let mean = sum / samples.len() as f32;
+    let filtered: Vec<(Segment, Ladder)> = segment::segments(footprints)
+        .into_par_iter()
+        .filter_map(|segment| segment.near(ladder::MOST_REACH, |i| samples[i].irradiance != [Vec3::ZERO; 2]))
+        .filter(|segment| segment.pixels.len() >= LEAST_PIXELS)
+        .map(|segment| {
+            let ladder = Ladder::climb(&segment, &samples, 0.1 * mean);
+            (segment, ladder)
+        })
+        .collect();
+    let mut correction = vec![Vec3::ZERO; samples.len()];
+    let mut squared_error = vec![None; samples.len()];
+    for (segment, ladder) in &filtered {
+        for &pixel in &segment.pixels {
+            let sample = &samples[pixel as usize];
+            let choice = ladder.choice(segment.local(pixel));
+            let raw = 0.5 * (sample.irradiance[0] + sample.irradiance[1]);
+            correction[pixel as usize] = sample.gain * (choice.irradiance - raw);
+            squared_error[pixel as usize] =
+                Some(choice.squared_error * mean_channel(sample.gain * sample.gain));
+        }
+    }
+    Some(Smoothing { correction, squared_error })
+}
+
+impl Sample {
+    fn of(means: &PixelMeans) -> Self {
+        let PixelMeans { irradiance, gain, .. } = *means;
+        let rest = means.total() - gain * 0.5 * (irradiance[0] + irradiance[1]);
+        Self { irradiance, gain, rest: rest.max(Vec3::ZERO) }
+    }
+}
+
+fn mean_channel(v: Vec3) -> f32 {
+    v.element_sum() / 3.0
+}

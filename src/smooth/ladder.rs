@@ -1,0 +1,259 @@
+//! The ladder of widths over one segment, and the choice between them.
+
+use super::segment::Segment;
+use super::{Sample, mean_channel};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// A width of the ladder: box filters applied one after the other, each way.
+#[derive(Clone, Copy, Debug)]
+struct Level {
+    /// Half widths of the boxes, in pixels.
+    boxes: &'static [usize],
+}
+
+/// From nothing to a standard deviation of 6.9 pixels. Two boxes make a tent, which is smooth enough.
+const LEVELS: [Level; 7] = [
+    Level { boxes: &[] },
+    Level { boxes: &[1] },
+    Level { boxes: &[1, 1] },
+    Level { boxes: &[2, 2] },
+    Level { boxes: &[3, 3] },
+    Level { boxes: &[5, 5] },
+    Level { boxes: &[8, 8] },
+];
+
+/// How far the widest filter looks, in pixels.
+pub(super) const MOST_REACH: usize = 16;
+
+impl Level {
+    /// Variance of the filter in each direction, pixels²: (w² - 1)/12 per box of w pixels.
+    fn variance(self) -> f32 {
+        self.boxes.iter().map(|&b| (((2 * b + 1).pow(2) - 1) as f32) / 12.0).sum()
+    }
+
+    fn reach(self) -> usize {
+        self.boxes.iter().sum()
+    }
+}
+
+/// Half widths of the windows over which noise and blur are averaged, from large to small.
+const WINDOWS: [usize; 5] = [48, 24, 12, 6, 4];
+
+/// A smaller window overrules a larger one only if it promises less than this share of its error.
+const OVERRULE: f32 = 0.6;
+
+/// The filtered segment.
+pub(super) struct Ladder {
+    choices: Vec<Choice>,
+}
+
+/// What was chosen for a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Choice {
+    /// Smoothed irradiance.
+    pub(super) irradiance: Vec3,
+    /// Estimated squared error of it, mean over channels.
+    pub(super) squared_error: f32,
+}
+
+/// One width: both halves filtered.
+struct Filtered {
+    halves: [Vec<Vec3>; 2],
+}
+
+/// Sums over rectangles of a plane in constant time.
+struct Sums {
+    width: usize,
+    height: usize,
+    table: Vec<f64>,
+}
+
+/// What a width is estimated to cost, as sums over windows.
+struct Cost {
+    bias: Sums,
+    noise: Sums,
+}
+
+impl Ladder {
+    /// Filters the segment at every width and chooses. `floor` is the radiance below which errors count
+    /// as absolute.
+    pub(super) fn climb(segment: &Segment, samples: &[Sample], floor: f32) -> Self {
+        let area = segment.size.0 * segment.size.1;
+        let mut mask = vec![0.0_f32; area];
+        let mut raw = [vec![Vec3::ZERO; area], vec![Vec3::ZERO; area]];
+        for &pixel in &segment.pixels {
+            let local = segment.local(pixel);
+            mask[local] = 1.0;
+            for (plane, irradiance) in raw.iter_mut().zip(samples[pixel as usize].irradiance) {
+                plane[local] = irradiance;
+            }
+        }
+        let levels: Vec<Filtered> =
+            LEVELS.par_iter().map(|level| filter(*level, &raw, &mask, segment.size)).collect();
+        let weights = weights(segment, samples, &levels[3], floor);
+        let costs: Vec<Cost> =
+            (0..LEVELS.len()).into_par_iter().map(|l| cost(l, &levels, &weights, segment.size)).collect();
+        let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
+        Self { choices: choose(&levels, &costs, &counts, &weights) }
+    }
+
+    pub(super) fn choice(&self, local: usize) -> Choice {
+        self.choices[local]
+    }
+}
+
+/// One over the squared radiance that an error of irradiance is relative to, from a smoothed picture; 0
+/// outside the segment.
+fn weights(segment: &Segment, samples: &[Sample], smooth: &Filtered, floor: f32) -> Vec<f32> {
+    let mut weights = vec![0.0; segment.size.0 * segment.size.1];
+    for &pixel in &segment.pixels {
+        let local = segment.local(pixel);
+        let sample = &samples[pixel as usize];
+        let irradiance = 0.5 * (smooth.halves[0][local] + smooth.halves[1][local]);
+        let radiance = mean_channel(sample.rest + sample.gain * irradiance) + floor;
+        let gain = mean_channel(sample.gain);
+        weights[local] = if radiance > 0.0 { (gain / radiance).powi(2) } else { 0.0 };
+    }
+    weights
+}
+
+/// Unbiased estimates of what the width blurs away beyond one two steps finer, and of the noise it leaves.
+fn cost(level: usize, levels: &[Filtered], weights: &[f32], size: (usize, usize)) -> Cost {
+    let finer = level.saturating_sub(2);
+    let (a, b) = (&levels[level].halves[0], &levels[level].halves[1]);
+    let (fa, fb) = (&levels[finer].halves[0], &levels[finer].halves[1]);
+    // Blur grows with the variance of the kernel: what one step shows tells of the whole.
+    let ratio = if level == 0 { 0.0 } else { LEVELS[finer].variance() / LEVELS[level].variance() };
+    let whole = (1.0 - ratio).powi(-2);
+    let bias = |i: usize| mean_channel((a[i] - fa[i]) * (b[i] - fb[i])) * whole * weights[i];
+    let noise = |i: usize| {
+        let d = a[i] - b[i];
+        0.25 * mean_channel(d * d) * weights[i]
+    };
+    let plane = |f: &dyn Fn(usize) -> f32| Sums::new(size, (0..weights.len()).map(|i| f64::from(f(i))));
+    Cost { bias: plane(&bias), noise: plane(&noise) }
+}
+
+/// From large windows to small, the width with the least estimated error.
+fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -> Vec<Choice> {
+    let (width, height) = (counts.width, counts.height);
+    let rows: Vec<Vec<Choice>> = (0..height)
+        .into_par_iter()
+        .map(|y| {
+            let choose_one = |x: usize| {
+                let i = y * width + x;
+                let widest = &levels[LEVELS.len() - 1].halves;
+                let dark = widest[0][i] == Vec3::ZERO && widest[1][i] == Vec3::ZERO;
+                if weights[i] == 0.0 || dark {
+                    return Choice {
+                        irradiance: 0.5 * (levels[0].halves[0][i] + levels[0].halves[1][i]),
+                        squared_error: 0.0,
+                    };
+                }
+                let (level, relative) = choose_level(costs, counts, (x, y));
+                let halves = &levels[level].halves;
+                Choice {
+                    irradiance: 0.5 * (halves[0][i] + halves[1][i]),
+                    squared_error: relative / weights[i],
+                }
+            };
+            (0..width).map(choose_one).collect()
+        })
+        .collect();
+    rows.concat()
+}
+
+/// The chosen width at a pixel and its estimated weighted squared error.
+fn choose_level(costs: &[Cost], counts: &Sums, at: (usize, usize)) -> (usize, f32) {
+    let mut chosen = 0;
+    let mut error = f32::INFINITY;
+    for (step, &window) in WINDOWS.iter().enumerate() {
+        let mut estimates = [0.0_f32; LEVELS.len()];
+        let mut bias = 0.0_f32;
+        for (l, cost) in costs.iter().enumerate() {
+            let near = window.max(LEVELS[l].reach());
+            // Wide filters leave noise that is alike over their reach: look at several of it.
+            let far = window.max(3 * LEVELS[l].reach());
+            bias = bias.max((cost.bias.around(at, near) / counts.around(at, near)) as f32);
+            estimates[l] = bias + (cost.noise.around(at, far) / counts.around(at, far)) as f32;
+        }
+        let best = (0..LEVELS.len()).min_by(|&a, &b| estimates[a].total_cmp(&estimates[b])).unwrap_or(0);
+        if step == 0 || estimates[best] < OVERRULE * estimates[chosen] {
+            chosen = best;
+        }
+        error = estimates[chosen];
+    }
+    (chosen, error)
+}
+
+/// Filters both halves within the mask: sums of masked values over sums of the mask, so that nothing is lost
+/// at the segment's border.
+fn filter(level: Level, raw: &[Vec<Vec3>; 2], mask: &[f32], size: (usize, usize)) -> Filtered {
+    if level.boxes.is_empty() {
+        return Filtered { halves: raw.clone() };
+    }
+    let mut share: Vec<Vec3> = mask.iter().map(|&m| Vec3::splat(m)).collect();
+    level.boxes.iter().for_each(|&b| box_filter(&mut share, b, size));
+    let halves = raw.clone().map(|mut plane| {
+        level.boxes.iter().for_each(|&b| box_filter(&mut plane, b, size));
+        for ((value, share), inside) in plane.iter_mut().zip(&share).zip(mask) {
+            *value = if *inside > 0.0 { *value / share.x } else { Vec3::ZERO };
+        }
+        plane
+    });
+    Filtered { halves }
+}
+
+/// Running sums over 2 `half` + 1 pixels across, then down (not divided by their number).
+fn box_filter(plane: &mut [Vec3], half: usize, (width, height): (usize, usize)) {
+    let mut line = vec![Vec3::ZERO; width.max(height)];
+    for y in 0..height {
+        running_sum(plane, &mut line[..width], half, |x| y * width + x);
+    }
+    for x in 0..width {
+        running_sum(plane, &mut line[..height], half, |y| y * width + x);
+    }
+}
+
+fn running_sum(plane: &mut [Vec3], line: &mut [Vec3], half: usize, at: impl Fn(usize) -> usize) {
+    let n = line.len();
+    for (k, value) in line.iter_mut().enumerate() {
+        *value = plane[at(k)];
+    }
+    // Sums are formed anew for each pixel of narrow boxes and carried on in f64 for all, so that no rounding
+    // is left behind by bright pixels.
+    let mut sum = line[..half.min(n)].iter().map(|v| v.as_dvec3()).sum::<glam::DVec3>();
+    for k in 0..n {
+        if k + half < n {
+            sum += line[k + half].as_dvec3();
+        }
+        plane[at(k)] = sum.as_vec3();
+        if k >= half {
+            sum -= line[k - half].as_dvec3();
+        }
+    }
+}
+
+impl Sums {
+    fn new((width, height): (usize, usize), values: impl Iterator<Item = f64>) -> Self {
+        let stride = width + 1;
+        let mut table = vec![0.0; stride * (height + 1)];
+        for (i, value) in values.enumerate() {
+            let (x, y) = (i % width, i / width);
+            let here = (y + 1) * stride + x + 1;
+            table[here] = value + table[here - 1] + table[here - stride] - table[here - stride - 1];
+        }
+        Self { width, height, table }
+    }
+
+    /// Sum over the square of `half` pixels around a pixel, clipped to the box.
+    #[inline]
+    fn around(&self, (x, y): (usize, usize), half: usize) -> f64 {
+        let stride = self.width + 1;
+        let (x0, y0) = (x.saturating_sub(half), y.saturating_sub(half));
+        let (x1, y1) = ((x + half + 1).min(self.width), (y + half + 1).min(self.height));
+        let at = |x: usize, y: usize| self.table[y * stride + x];
+        at(x1, y1) - at(x0, y1) - at(x1, y0) + at(x0, y0)
+    }
+}
