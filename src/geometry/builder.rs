@@ -83,6 +83,19 @@ impl GeometryBuilder {
         self.primitives.meshes.push(Mesh::new(mesh));
     }
 
+    /// Number of primitives so far.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.primitives.sources.len()
+    }
+
+    /// Box of the primitives after the first `count`.
+    #[must_use]
+    pub fn bounds_after(&self, count: usize) -> Bounds {
+        let sources = self.primitives.sources.iter().skip(count);
+        sources.fold(Bounds::EMPTY, |all, source| all.union(self.bounds_of(*source)))
+    }
+
     fn other(&mut self, object: ObjectId, shape: Shape) {
         let owner = Owner { first: self.primitives.sources.len() as u32, object, mesh: None };
         if self.owners.last().is_none_or(|last| (last.object, last.mesh) != (object, None)) {

@@ -3,9 +3,10 @@
 use super::super::ObjectId;
 use super::super::file::ObjectFile;
 use super::super::issue::IssueCode;
+use super::super::read::MAX_LENGTH;
 use super::super::shape_file::{BoxFile, HeightfieldFile, InstanceFile, RotateFile, ShapeFile};
 use super::Compiler;
-use crate::geometry::{MeshData, SharedMeshId};
+use crate::geometry::{Bounds, MeshData, SharedMeshId};
 use glam::{DAffine3, DQuat, DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 
@@ -165,7 +166,14 @@ impl<'f> Compiler<'f> {
             return refuse(self, IssueCode::ConflictingFields, message);
         }
         let placed = Placed { file, object, pointer, to_world: transform(file) };
+        let before = self.geometry.count();
         self.place(&original.shape, index, &placed);
+        let Bounds { min, max } = self.geometry.bounds_after(before);
+        let farthest = f64::from(min.abs().max(max.abs()).max_element());
+        if self.geometry.count() > before && (farthest > MAX_LENGTH || farthest.is_nan()) {
+            let message = format!("this would be farther than {MAX_LENGTH:e} m from the origin");
+            self.issues.add(pointer, IssueCode::OutOfRange, message);
+        }
     }
 
     fn place(&mut self, shape: &ShapeFile, index: usize, placed: &Placed<'_>) {
