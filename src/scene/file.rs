@@ -5,10 +5,10 @@
 use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
 use super::read::{
-    Context, Decode, Fields, choice, color, count, direction, list, name, named, note_duplicates, object,
-    optional, or, pair, part, point, real, record, reference, required, seed, size2, slots, tagged, triangle,
-    uv,
+    Context, Decode, Fields, choice, color, count, direction, name, named, note_duplicates, object, optional,
+    or, pair, part, point, real, record, reference, required, seed, size2, slots, tagged,
 };
+use super::shape_file::ShapeFile;
 use super::{Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
@@ -169,51 +169,6 @@ record! {
         ..
         /// Its shape.
         shape: ShapeFile
-    }
-}
-
-tagged! {
-    /// A shape.
-    ShapeFile {
-        "sphere" => Sphere(SphereFile),
-        "polygon" => Polygon(PolygonFile),
-        "mesh" => Mesh(MeshFile),
-    }
-}
-
-record! {
-    /// A sphere.
-    SphereFile {
-        /// Centre.
-        center: [f64; 3] = required(point()),
-        /// Radius.
-        radius: f64 = required(real("radius in metres").positive_length()),
-    }
-}
-
-record! {
-    /// A planar polygon, convex or not.
-    PolygonFile {
-        /// The outline, anticlockwise seen from the front.
-        vertices: Vec<[f64; 3]> = required(list(3, point())),
-        /// Outlines of holes, in either order.
-        holes: Vec<Vec<[f64; 3]>> = or(list(0, list(3, point())), Vec::new()),
-    }
-}
-
-record! {
-    /// A triangle mesh, here or in a file of its own.
-    MeshFile {
-        /// A PLY or OBJ file.
-        asset: Option<String> = optional(name()),
-        /// Positions of the vertices.
-        positions: Option<Vec<[f64; 3]>> = optional(list(3, point())),
-        /// Three indices of vertices per triangle.
-        triangles: Option<Vec<[u32; 3]>> = optional(list(1, triangle())),
-        /// A normal per vertex.
-        normals: Option<Vec<[f64; 3]>> = optional(list(3, direction())),
-        /// Texture coordinates per vertex.
-        uvs: Option<Vec<[f64; 2]>> = optional(list(3, uv())),
     }
 }
 

@@ -13,6 +13,7 @@ mod light;
 mod material;
 mod mesh_file;
 mod read;
+mod shape_file;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
 pub use camera::Camera;

@@ -6,6 +6,7 @@ mod caustics;
 mod determinism;
 mod direct_light;
 mod geometry;
+mod geometry_shapes;
 mod geometry_structures;
 mod optics;
 mod photon_map;
