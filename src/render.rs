@@ -386,6 +386,12 @@ impl Render {
         self.picture().layer(class)
     }
 
+    /// One class of paths as it was gathered: nothing is smoothed.
+    #[must_use]
+    pub fn raw_layer(&self, class: PathClass) -> LinearImage {
+        self.film.raw_layer(class)
+    }
+
     /// The scene that is rendered.
     #[must_use]
     pub fn scene(&self) -> &Scene {

@@ -10,6 +10,7 @@ mod geometry_shapes;
 mod geometry_structures;
 mod optics;
 mod photon_map;
+mod picture;
 mod plan;
 mod scene_file;
 mod support;
