@@ -4,6 +4,7 @@ use crate::effort::MOST_SHIFT;
 use crate::film::Film;
 use crate::light_path::Bounce;
 use crate::pass1_light::{self, Block, Budget, Source, Tally, Window};
+use crate::pass2_eye::Footprints;
 use crate::photon_map;
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
@@ -56,6 +57,10 @@ const LEAST_LOG2: u32 = 8;
 
 /// Most photons per half and round in all: bounds the memory of a round.
 const MOST_LOG2: u32 = 21;
+
+/// Bytes per pixel while caustics that fill the picture are smoothed: seven widths of both halves and the sums of
+/// their costs.
+const SMOOTHING_BYTES: u64 = 360;
 
 /// A window and what its pilot found.
 struct Pilot {
@@ -234,9 +239,13 @@ impl Plan {
         // While a tree is built its photons stand in memory in three forms: as traced (56 bytes), as entries
         // and in the tree's arrays, which double as they grow.
         let per_photon = 56 + 3 * photon_map::BYTES_PER_PHOTON;
-        // The sum, the round and the tiles of the round before they are put in place.
-        let films = 3 * Film::bytes(scene.image.width, scene.image.height);
-        scene.geometry.memory_bytes() + films + photons * per_photon
+        let (width, height) = (scene.image.width, scene.image.height);
+        let pixels = u64::from(width) * u64::from(height);
+        let film = Film::bytes(width, height);
+        // A round and its tiles, while it is made, or the ladder of widths, while it is smoothed.
+        let passing = if self.photons.is_empty() { 2 * film } else { (2 * film).max(pixels * SMOOTHING_BYTES) };
+        let footprints = if self.photons.is_empty() { 0 } else { pixels * Footprints::BYTES_PER_PIXEL };
+        scene.geometry.memory_bytes() + film + footprints + passing + photons * per_photon
     }
 }
 

@@ -63,7 +63,7 @@ pub struct Settings {
     #[arg(long, env = "NEPHROID_MAX_SECONDS", default_value_t = 600.0, value_parser = parse_seconds)]
     pub max_seconds: f64,
     /// Most memory that the plan of one job may ask for, in bytes (suffixes k, M, G of 1024)
-    #[arg(long, env = "NEPHROID_MAX_MEMORY", default_value = "4G", value_parser = parse_bytes)]
+    #[arg(long, env = "NEPHROID_MAX_MEMORY", default_value = "6G", value_parser = parse_bytes)]
     pub max_memory: usize,
     /// Listen beyond loopback although everyone who can connect may use everything
     #[arg(long, env = "NEPHROID_OPEN")]
