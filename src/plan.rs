@@ -187,7 +187,7 @@ impl Plan {
     }
 
     fn decide_direct(&mut self, scene: &Scene) {
-        let delta = |l: &Light| matches!(l, Light::Point { .. } | Light::Directional { .. });
+        let delta = |l: &Light| l.surface_radiance().is_none();
         let lit = scene.lights.iter().filter(|l| !l.is_dark()).count();
         let dark = scene.lights.len() - lit;
         if dark > 0 {
@@ -203,7 +203,7 @@ impl Plan {
         } else {
             (
                 "one shadow ray per light to a sampled point",
-                "area lights are sampled by solid angle, Owen-scrambled Sobol",
+                "quads and spheres are sampled by solid angle, other lights by area; Owen-scrambled Sobol",
             )
         };
         self.decide("direct light", true, choice, reason);
@@ -273,12 +273,7 @@ pub fn source_name(scene: &Scene, source: Source) -> String {
     match source {
         Source::Environment => "environment".to_owned(),
         Source::Light(id) => {
-            let kind = match &scene.lights[id.index()] {
-                Light::Point { .. } => "point",
-                Light::Directional { .. } => "directional",
-                Light::Quad(_) => "quad",
-            };
-            format!("{kind} light {}", id.0)
+            format!("{} light {}", scene.lights[id.index()].kind(), id.0)
         }
     }
 }

@@ -2,13 +2,14 @@
 
 use crate::geometry::{Ray, SurfacePoint, offset_origin};
 use crate::sampling::{SamplePoint, cosine_hemisphere};
-use crate::scene::{Light, QuadLight, Scene};
+use crate::scene::{Light, Scene, SpotLight};
 use glam::Vec3;
 use std::f32::consts::PI;
 
+mod area;
 mod spherical_rectangle;
 
-use spherical_rectangle::SphericalRectangle;
+use area::{from_disk, from_mesh, from_quad, from_sphere};
 
 /// The surface that is lit, on the side that is seen.
 pub(super) struct Receiver<'a> {
@@ -40,7 +41,11 @@ pub(super) fn direct_light(
         let incident = match light {
             Light::Point { position, intensity } => from_point(receiver, *position, *intensity),
             Light::Directional { direction, irradiance } => from_afar(receiver, *direction, *irradiance),
-            Light::Quad(quad) => from_quad(receiver, quad, sample),
+            Light::Spot(spot) => from_spot(receiver, spot),
+            Light::Quad(quad) => from_quad(receiver, quad, sample.get_2d(2)),
+            Light::Disk(disk) => from_disk(receiver, disk, sample.get_2d(2)),
+            Light::Sphere(sphere) => from_sphere(receiver, sphere, sample.get_2d(2)),
+            Light::Mesh(mesh) => from_mesh(receiver, mesh, sample.get_2d(2)),
         };
         sum += visible(scene, receiver, incident, shadow_rays);
     }
@@ -84,6 +89,12 @@ fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Optio
     (cosine > 0.0).then_some(Incident { direction, distance: short_of(distance), irradiance })
 }
 
+fn from_spot(receiver: &Receiver<'_>, spot: &SpotLight) -> Option<Incident> {
+    let mut incident = from_point(receiver, spot.position, Vec3::ONE)?;
+    incident.irradiance *= spot.intensity_along(-incident.direction);
+    Some(incident)
+}
+
 fn from_afar(receiver: &Receiver<'_>, direction: Vec3, irradiance: Vec3) -> Option<Incident> {
     let cosine = -receiver.normal.dot(direction);
     (cosine > 0.0).then_some(Incident {
@@ -91,25 +102,6 @@ fn from_afar(receiver: &Receiver<'_>, direction: Vec3, irradiance: Vec3) -> Opti
         distance: f32::INFINITY,
         irradiance: irradiance * cosine,
     })
-}
-
-/// A direction to the rectangle uniform in solid angle, so that near and slanting lights are no noisier than
-/// the cosine at the receiver.
-fn from_quad(receiver: &Receiver<'_>, quad: &QuadLight, sample: SamplePoint) -> Option<Incident> {
-    let from = receiver.surface.point;
-    if (from - quad.center).dot(quad.normal) <= 0.0 {
-        return None;
-    }
-    let rectangle = SphericalRectangle::new(quad, from)?;
-    let target = rectangle.sample(sample.get_2d(2));
-    let error = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element() * f32::EPSILON;
-    let target = offset_origin(target, 4.0 * error, quad.normal, quad.normal);
-    let to = target - from;
-    let distance = to.length();
-    let direction = to.try_normalize()?;
-    let cosine = receiver.normal.dot(direction);
-    let irradiance = quad.radiance * (cosine.max(0.0) * rectangle.solid_angle);
-    (cosine > 0.0).then_some(Incident { direction, distance: short_of(distance), irradiance })
 }
 
 /// A few ulps less, so that rounding of the distance cannot put the shadow ray's end behind the light.

@@ -14,7 +14,7 @@ use crate::light_path::PathClass;
 use crate::optics::{self, Event, Interaction, Outcome};
 use crate::photon_map::Lookup;
 use crate::sampling::SamplePoint;
-use crate::scene::{Light, Material, Texture};
+use crate::scene::{Material, Texture};
 use glam::{Vec2, Vec3};
 
 /// Both ways are followed while each still carries this share of the pixel.
@@ -206,9 +206,9 @@ impl<'a> EyeWalk<'a> {
         let backside = branch.ray.direction.dot(hit.surface.normal) > 0.0;
         if let Some(light) = scene.objects[hit.object.index()].emitter
             && !backside
-            && let Light::Quad(quad) = &scene.lights[light.index()]
+            && let Some(radiance) = scene.lights[light.index()].surface_radiance()
         {
-            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * quad.radiance);
+            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * radiance);
         }
         let albedo = albedo.eval(hit.surface.uv);
         if albedo == Vec3::ZERO {

@@ -17,7 +17,7 @@ mod read;
 pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
 pub use camera::Camera;
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
-pub use light::{Light, QuadLight};
+pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
 pub use material::{Material, Texture};
 
 use crate::geometry::{Geometry, Structure};

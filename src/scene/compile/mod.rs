@@ -1,6 +1,7 @@
 //! From the scene file to the compiled scene: names to ids, numbers to axes, and every check that
 //! needs more than one field.
 
+mod emission;
 mod light;
 mod mesh;
 mod polygon;
@@ -155,6 +156,7 @@ impl<'f> Compiler<'f> {
             let name = object.name.clone().unwrap_or_else(|| format!("objects/{index}"));
             let id = self.add_object(Object { name, material, emitter: None });
             self.shape(id, &object.shape, &pointer);
+            self.emission(id, object, index);
         }
     }
 
