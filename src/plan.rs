@@ -8,7 +8,7 @@ use crate::photon_map;
 use crate::radius::RadiusRule;
 use crate::render::Control;
 use crate::sampling::hash;
-use crate::scene::{Light, Material, Paths, Scene};
+use crate::scene::{Light, LightSampling, Material, Paths, Scene};
 use glam::Vec3;
 
 /// What a render will do. A pure function of the scene.
@@ -200,6 +200,11 @@ impl Plan {
         }
         let (choice, reason) = if scene.lights.iter().all(delta) {
             ("one shadow ray per light", "the lights have no size: nothing to sample")
+        } else if scene.render.light_sampling != LightSampling::Sobol {
+            (
+                "a grid of shadow rays per quad or disk light",
+                "`light_sampling` asks for it; the default, one Sobol point, is quicker for the same error",
+            )
         } else {
             (
                 "one shadow ray per light to a sampled point",

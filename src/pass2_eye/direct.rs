@@ -8,8 +8,10 @@ use std::f32::consts::PI;
 
 mod area;
 mod spherical_rectangle;
+mod strata;
 
 use area::{from_disk, from_mesh, from_quad, from_sphere};
+use strata::Strata;
 
 /// The surface that is lit, on the side that is seen.
 pub(super) struct Receiver<'a> {
@@ -28,7 +30,7 @@ struct Incident {
     irradiance: Vec3,
 }
 
-/// Irradiance of all lights at a D, one shadow ray each.
+/// Irradiance of all lights at a D, one shadow ray each unless the scene asks for more.
 pub(super) fn direct_light(
     scene: &Scene,
     receiver: &Receiver<'_>,
@@ -38,6 +40,11 @@ pub(super) fn direct_light(
     let mut sum = Vec3::ZERO;
     for (i, light) in scene.lights.iter().enumerate() {
         let sample = if i == 0 { sample } else { sample.branch(i as u64) };
+        let mut strata = Strata { scene, receiver, light, shadow_rays };
+        if let Some(irradiance) = strata.irradiance(sample) {
+            sum += irradiance;
+            continue;
+        }
         let incident = match light {
             Light::Point { position, intensity } => from_point(receiver, *position, *intensity),
             Light::Directional { direction, irradiance } => from_afar(receiver, *direction, *irradiance),

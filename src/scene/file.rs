@@ -9,7 +9,7 @@ use super::read::{
     optional, or, pair, part, point, real, record, reference, required, seed, size2, slots, tagged, triangle,
     uv,
 };
-use super::{Paths, Tone};
+use super::{LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
 use std::collections::BTreeSet;
@@ -18,6 +18,8 @@ use std::collections::BTreeSet;
 const VERSION: f64 = 1.0;
 /// Most pixels across or down.
 const MAX_IMAGE_SIDE: u32 = 16_384;
+/// Squares along each side of a light, if not given.
+const LIGHT_GRID: u32 = 4;
 
 /// Reads a scene file as far as it is right. What is wrong is noted, and missing in the result.
 pub(super) fn read_scene_file(root: &Node<'_>, issues: &mut Issues) -> Option<SceneFile> {
@@ -323,7 +325,6 @@ record! {
 
 record! {
     /// What is asked of the renderer.
-    #[derive(Default)]
     RenderFile {
         /// Which light paths are computed.
         paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
@@ -333,8 +334,26 @@ record! {
         radius: RadiusRule = or(choice(RadiusRule::NAMED.to_vec()), RadiusRule::Pixel),
         /// The structure that finds what a ray meets; all find the same.
         structure: Structure = or(choice(Structure::NAMED.to_vec()), Structure::Auto),
+        /// How quad and disk lights are sampled.
+        light_sampling: LightSampling = or(choice(LightSampling::NAMED.to_vec()), LightSampling::Sobol),
+        /// Squares along each side of such a light, unless it is sampled by `sobol`.
+        light_grid: u32 = or(count("squares along each side of a light", 1, 64), LIGHT_GRID),
         /// Seed of every random stream.
         seed: u64 = or(seed(), 0),
+    }
+}
+
+impl Default for RenderFile {
+    fn default() -> Self {
+        Self {
+            paths: Paths::default(),
+            stop: None,
+            radius: RadiusRule::default(),
+            structure: Structure::default(),
+            light_sampling: LightSampling::default(),
+            light_grid: LIGHT_GRID,
+            seed: 0,
+        }
     }
 }
 

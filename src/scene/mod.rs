@@ -139,8 +139,33 @@ impl std::str::FromStr for Paths {
     }
 }
 
+/// How a quad or disk light is sampled at a D.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum LightSampling {
+    /// One point per eye sample, from the sample's Sobol sequence; quads by solid angle.
+    #[default]
+    Sobol,
+    /// The centres of a regular grid: the same for every eye sample, so that shadows show bands.
+    Grid,
+    /// A random point in each square of the grid.
+    Jittered,
+    /// The corners of each square; where they disagree on whether they are seen, the square is divided. What is
+    /// smaller than a square and hides none of its corners is missed, whatever the number of eye samples.
+    Adaptive,
+}
+
+impl LightSampling {
+    /// Every value and its name.
+    pub const NAMED: [(&str, Self); 4] = [
+        ("sobol", Self::Sobol),
+        ("grid", Self::Grid),
+        ("jittered", Self::Jittered),
+        ("adaptive", Self::Adaptive),
+    ];
+}
+
 /// What the scene file asks of the renderer.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
     /// Which light paths are computed.
     pub paths: Paths,
@@ -150,6 +175,10 @@ pub struct RenderSettings {
     pub radius: RadiusRule,
     /// The structure over the primitives.
     pub structure: Structure,
+    /// How quad and disk lights are sampled.
+    pub light_sampling: LightSampling,
+    /// Squares along each side of such a light, where it is not sampled by the default.
+    pub light_grid: u32,
     /// Seed of every random stream.
     pub seed: u64,
 }

@@ -7,6 +7,7 @@ mod determinism;
 mod direct_light;
 mod geometry;
 mod geometry_structures;
+mod light_sampling;
 mod lights;
 mod optics;
 mod photon_map;

@@ -47,7 +47,8 @@ pub(super) fn from_disk(receiver: &Receiver<'_>, disk: &DiskLight, u: Vec2) -> O
     towards(receiver, &target, by_area(disk.radiance * disk.area()))
 }
 
-fn disk_point(disk: &DiskLight, point: Vec3) -> LightPoint {
+/// A point of a disk light.
+pub(super) fn disk_point(disk: &DiskLight, point: Vec3) -> LightPoint {
     let error = (disk.center.abs().max_element() + disk.radius) * (4.0 * f32::EPSILON);
     LightPoint { point, normal: disk.normal, error }
 }

@@ -194,8 +194,8 @@ impl<'f> Compiler<'f> {
                 Stop { error: error.map(|e| e as f32), seconds: *seconds, rounds: *rounds }
             }
         };
-        let RenderFile { paths, radius, structure, seed, stop: _ } = *render;
-        Some(RenderSettings { paths, stop, radius, structure, seed })
+        let RenderFile { paths, radius, structure, light_sampling, light_grid, seed, stop: _ } = *render;
+        Some(RenderSettings { paths, stop, radius, structure, light_sampling, light_grid, seed })
     }
 }
 
