@@ -79,7 +79,15 @@ impl Plan {
         plan.decide_pass_1(scene);
         plan.decide_direct(scene);
         plan.decide_structure(scene);
-        plan.decide("lens", false, "pinhole", "the camera has no aperture: no lens samples");
+        match scene.camera.lens() {
+            Some(_) => plan.decide(
+                "lens",
+                true,
+                "one point of the lens per eye sample",
+                "the camera has an aperture",
+            ),
+            None => plan.decide("lens", false, "pinhole", "the camera has no aperture: no lens samples"),
+        }
         plan.decide("time", false, "one instant", "nothing moves: no time samples");
         plan.decide("colour", true, "RGB", "nothing disperses light: no wavelengths");
         plan.memory_bytes = plan.estimate_memory(scene);

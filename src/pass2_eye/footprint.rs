@@ -65,10 +65,14 @@ const SAME_FACE: f32 = 0.95;
 const STRAIGHTNESS: f32 = 0.1;
 
 impl Footprints {
-    /// Traces the corners of all pixels.
+    /// Traces the corners of all pixels. Through a lens no pixel has a footprint.
     #[must_use]
     pub fn trace(scene: &Scene) -> Self {
         let (width, height) = (scene.image.width as usize, scene.image.height as usize);
+        if scene.camera.lens().is_some() {
+            // Through a lens a pixel sees more than lies between its corners: photons are looked up instead.
+            return Self { width, pixels: vec![None; width * height] };
+        }
         let corners: Vec<Vec<Option<Landing>>> = (0..=height)
             .into_par_iter()
             .map(|y| (0..=width).map(|x| land(scene, Vec2::new(x as f32, y as f32))).collect())

@@ -29,6 +29,9 @@ const MAX_BOUNCES: u32 = 64;
 /// Sobol dimensions 0 and 1 place the sample in the pixel, 2 to 5 light the D; then two per S.
 const FIRST_EVENT_DIMENSION: u32 = 6;
 
+/// The lens is drawn from these two dimensions of the sample itself; D and S draw from its branches.
+const LENS_DIMENSION: u32 = 14;
+
 /// What the rays of pass 2 did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EyeCounts {
@@ -66,8 +69,8 @@ pub(super) enum Lookups {
 /// Follows eye rays; owns the stack of branches yet to follow.
 pub(super) struct EyeWalk<'a> {
     context: &'a EyeContext<'a>,
-    /// Radius of the density estimate per metre of the eye ray's way.
-    kernel_spread: f32,
+    /// Radius of the density estimate in pixels.
+    kernel_pixels: f32,
     stack: Vec<Branch>,
     /// The eye sample that is being followed.
     half: usize,
@@ -93,12 +96,11 @@ struct Branch {
 
 impl<'a> EyeWalk<'a> {
     pub(super) fn new(context: &'a EyeContext<'a>) -> Self {
-        let pixels = context.plan.radius.pixels(context.round) as f32;
-        let kernel_spread = context.scene.camera.pixel_spread() * pixels;
+        let kernel_pixels = context.plan.radius.pixels(context.round) as f32;
         let sample = SamplePoint::new(0, 0);
         Self {
             context,
-            kernel_spread,
+            kernel_pixels,
             stack: Vec::new(),
             half: 0,
             sample,
@@ -116,7 +118,11 @@ impl<'a> EyeWalk<'a> {
 
     /// Adds what arrives along one eye ray to the classes' sums.
     pub(super) fn trace(&mut self, raster: Vec2, sums: &mut PixelSums) {
-        let ray = self.context.scene.camera.ray(raster);
+        let camera = &self.context.scene.camera;
+        let ray = match camera.lens() {
+            Some(lens) => camera.ray_through(lens, raster, self.sample.get_2d(LENS_DIMENSION)),
+            None => camera.ray(raster),
+        };
         self.stack.clear();
         self.stack.push(Branch {
             ray,
@@ -238,7 +244,7 @@ impl<'a> EyeWalk<'a> {
     /// Irradiance by density estimation around the point, with a kernel of about a pixel.
     fn look_up(&mut self, branch: &Branch, hit: &Hit, normal: Vec3) -> Vec3 {
         let Some(photons) = self.context.photons else { return Vec3::ZERO };
-        let radius = (branch.travelled + hit.t) * self.kernel_spread;
+        let radius = self.context.scene.camera.pixel_width(branch.travelled + hit.t) * self.kernel_pixels;
         let point = hit.surface.point;
         let lookup = Lookup { point, normal, sheet: hit.sheet, radius };
         self.counts.lookups += 1;

@@ -5,9 +5,9 @@
 use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
 use super::read::{
-    Context, Decode, Fields, choice, color, count, direction, list, name, named, note_duplicates, object,
-    optional, or, pair, part, point, real, record, reference, required, seed, size2, slots, tagged, triangle,
-    uv,
+    Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, list, name, named, note_duplicates,
+    object, optional, or, pair, part, point, real, record, reference, required, seed, size2, slots, tagged,
+    triangle, uv,
 };
 use super::{LightSampling, Paths, Tone};
 use crate::geometry::Structure;
@@ -84,13 +84,14 @@ tagged! {
     /// A camera.
     CameraFile {
         "perspective" => Perspective(PerspectiveFile),
+        "orthographic" => Orthographic(OrthographicFile),
     }
 }
 
 record! {
-    /// A pinhole camera.
+    /// A pinhole or thin-lens camera.
     PerspectiveFile {
-        /// Position of the pinhole.
+        /// Position of the pinhole, or of the lens's centre.
         eye: [f64; 3] = required(point()),
         /// A point in the middle of the picture.
         target: [f64; 3] = required(point()),
@@ -98,6 +99,25 @@ record! {
         up: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
         /// Vertical field of view in degrees.
         fov: f64 = required(real("vertical field of view in degrees").above(0.0).below(180.0)),
+        /// Diameter of the lens in metres; 0 is a pinhole.
+        aperture: f64 = or(real("diameter of the lens in metres").between(0.0, MAX_LENGTH), 0.0),
+        /// Distance from the lens, along the view, of the plane that is sharp, in metres; that of the target if
+        /// left out.
+        focus_distance: Option<f64> = optional(real("distance in metres").positive_length()),
+    }
+}
+
+record! {
+    /// A camera whose rays are parallel: things keep their size at any distance.
+    OrthographicFile {
+        /// A point of the plane that the rays start from: what is behind it is not seen.
+        eye: [f64; 3] = required(point()),
+        /// A point in the middle of the picture.
+        target: [f64; 3] = required(point()),
+        /// The direction that is up in the picture.
+        up: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
+        /// Height of what is seen, in metres.
+        height: f64 = required(real("height in metres").positive_length()),
     }
 }
 

@@ -15,7 +15,7 @@ mod mesh_file;
 mod read;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
-pub use camera::Camera;
+pub use camera::{Camera, Lens, Projection};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
 pub use material::{Material, Texture};

@@ -1,6 +1,7 @@
 //! From the scene file to the compiled scene: names to ids, numbers to axes, and every check that
 //! needs more than one field.
 
+mod camera;
 mod emission;
 mod light;
 mod mesh;
@@ -8,24 +9,18 @@ mod polygon;
 
 use super::assets::AssetSource;
 use super::file::{
-    AlbedoFile, CameraFile, ImageFile, MaterialFile, ObjectFile, PerspectiveFile, RenderFile, SceneFile,
-    ShapeFile, StopFile, read_scene_file,
+    AlbedoFile, ImageFile, MaterialFile, ObjectFile, RenderFile, SceneFile, ShapeFile, StopFile,
+    read_scene_file,
 };
 use super::issue::{IssueCode, Issues, SceneErrors};
 use super::json::{ParseError, ParseErrorKind, parse};
 use super::{
-    Camera, ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop,
-    Texture, Tone,
+    ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Texture, Tone,
 };
 use crate::geometry::GeometryBuilder;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use mesh::MeshLoader;
 use std::collections::HashMap;
-
-/// Least sine of the angle between `up` and the view: below it the picture's horizon is rounding error.
-const MIN_UP_SINE: f64 = 1e-5;
-/// Bounds of the tangent of half the field of view within which a float still tells pixels apart.
-const TAN_HALF_FOV: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
 
 impl Scene {
     /// Reads and compiles a scene file; `assets` gives the meshes that it names.
@@ -100,38 +95,6 @@ struct Compiler<'f> {
 }
 
 impl<'f> Compiler<'f> {
-    fn camera(&mut self, camera: &CameraFile, image: ImageSettings) -> Option<Camera> {
-        let CameraFile::Perspective(PerspectiveFile { eye, target, up, fov }) = camera;
-        let (from, to) = (DVec3::from(*eye), DVec3::from(*target));
-        let view = to - from;
-        // What is left of the view after rounding the positions to floats.
-        let blur = f64::from(f32::EPSILON) * from.abs().max(to.abs()).max_element();
-        if view.length() <= 4.0 * blur {
-            let message = "the target must differ from the eye: there is no direction to look in";
-            self.issues.add("/camera/target", IssueCode::Degenerate, message);
-            return None;
-        }
-        if view.normalize().cross(DVec3::from(*up).normalize()).length() < MIN_UP_SINE {
-            let message = "`up` must not be parallel to the direction from eye to target";
-            self.issues.add("/camera/up", IssueCode::Degenerate, message);
-            return None;
-        }
-        let resolution = Vec2::new(image.width as f32, image.height as f32);
-        let camera = Camera::look_at(vec3(*eye), vec3(*target), vec3(*up), *fov as f32, resolution);
-        match camera {
-            Some(camera) if TAN_HALF_FOV.contains(&camera.tan_half_fov) => Some(camera),
-            Some(_) => {
-                let message = format!("a field of view of {fov} degrees is too close to 0 or 180");
-                self.issues.add("/camera/fov", IssueCode::OutOfRange, message);
-                None
-            }
-            None => {
-                self.issues.add("/camera", IssueCode::Degenerate, "eye, target and up span no picture");
-                None
-            }
-        }
-    }
-
     fn materials(&mut self, materials: &'f [(String, Option<MaterialFile>)]) {
         for (name, material) in materials {
             if let Some(material) = material {
