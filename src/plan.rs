@@ -255,7 +255,7 @@ impl Plan {
 fn receives(material: &Material) -> bool {
     match material {
         Material::Diffuse { albedo } => !albedo.is_black(),
-        Material::Mirror { .. } | Material::Glass { .. } => false,
+        Material::Mirror { .. } | Material::Metal(_) | Material::Glass { .. } => false,
     }
 }
 

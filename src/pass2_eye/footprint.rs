@@ -8,7 +8,7 @@
 use crate::geometry::{Hit, Ray, SheetId, offset_origin};
 use crate::optics::{self, Interaction};
 use crate::sampling::hash;
-use crate::scene::{Material, Scene};
+use crate::scene::Scene;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -176,9 +176,5 @@ fn land(scene: &Scene, raster: Vec2) -> Option<Landing> {
 
 /// What the surface does if it is an S.
 fn interact(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<Interaction> {
-    match scene.material_of(hit.object) {
-        Material::Diffuse { .. } => None,
-        Material::Mirror { reflectance } => Some(optics::mirror(ray.direction, &hit.surface, *reflectance)),
-        Material::Glass { ior } => Some(optics::glass(ray.direction, &hit.surface, *ior)),
-    }
+    optics::interact(scene.material_of(hit.object), ray.direction, &hit.surface)
 }

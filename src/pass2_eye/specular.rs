@@ -85,6 +85,8 @@ pub(super) struct EyeWalk<'a> {
 struct Branch {
     ray: Ray,
     throughput: Vec3,
+    /// Absorption coefficient of what the ray goes through.
+    absorption: Vec3,
     bounces: u32,
     /// Length of the way from the eye.
     travelled: f32,
@@ -127,6 +129,7 @@ impl<'a> EyeWalk<'a> {
         self.stack.push(Branch {
             ray,
             throughput: Vec3::ONE,
+            absorption: Vec3::ZERO,
             bounces: 0,
             travelled: 0.0,
             key: 1,
@@ -137,22 +140,24 @@ impl<'a> EyeWalk<'a> {
         }
     }
 
-    fn follow(&mut self, branch: Branch, sums: &mut PixelSums) {
+    fn follow(&mut self, mut branch: Branch, sums: &mut PixelSums) {
         let scene = self.context.scene;
         self.counts.eye_rays += 1;
         let Some(hit) = scene.geometry.closest_hit(&branch.ray) else {
-            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * scene.environment);
+            let throughput = branch.throughput * optics::transmittance(branch.absorption, f32::INFINITY);
+            sums.halves[self.half].classes.add(PathClass::Emitted, throughput * scene.environment);
             return;
         };
-        match scene.material_of(hit.object) {
+        let material = scene.material_of(hit.object);
+        let direction = branch.ray.direction;
+        branch.absorption = optics::absorption_before(material, direction, &hit.surface, branch.absorption);
+        branch.throughput *= optics::transmittance(branch.absorption, hit.t);
+        match material {
             Material::Diffuse { albedo } => self.arrive(&branch, &hit, albedo, sums),
-            Material::Mirror { reflectance } => {
-                let interaction = optics::mirror(branch.ray.direction, &hit.surface, *reflectance);
-                self.scatter(&branch, &hit, &interaction);
-            }
-            Material::Glass { ior } => {
-                let interaction = optics::glass(branch.ray.direction, &hit.surface, *ior);
-                self.scatter(&branch, &hit, &interaction);
+            Material::Mirror { .. } | Material::Metal(_) | Material::Glass { .. } => {
+                if let Some(interaction) = optics::interact(material, direction, &hit.surface) {
+                    self.scatter(&branch, &hit, &interaction);
+                }
             }
         }
     }
@@ -196,9 +201,11 @@ impl<'a> EyeWalk<'a> {
         }
         let surface = &hit.surface;
         let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
+        let material = self.context.scene.material_of(hit.object);
         self.stack.push(Branch {
             ray: Ray::new(origin, outcome.direction),
             throughput,
+            absorption: optics::absorption_after(material, outcome, surface, branch.absorption),
             bounces: branch.bounces + 1,
             travelled: branch.travelled + hit.t,
             key: outcome.extend_key(branch.key),

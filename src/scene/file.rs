@@ -18,6 +18,8 @@ use std::collections::BTreeSet;
 const VERSION: f64 = 1.0;
 /// Most pixels across or down.
 const MAX_IMAGE_SIDE: u32 = 16_384;
+/// Largest index of refraction.
+const MAX_INDEX: f64 = 100.0;
 /// Squares along each side of a light, if not given.
 const LIGHT_GRID: u32 = 4;
 
@@ -126,6 +128,7 @@ tagged! {
     MaterialFile {
         "diffuse" => Diffuse(DiffuseFile),
         "mirror" => Mirror(MirrorFile),
+        "metal" => Metal(MetalFile),
         "glass" => Glass(GlassFile),
     }
 }
@@ -174,10 +177,24 @@ record! {
 }
 
 record! {
+    /// Smooth metal: either `f0`, or `n` and `k`.
+    MetalFile {
+        /// Fraction of the light reflected at normal incidence; more at an angle by Schlick's approximation.
+        f0: Option<[f64; 3]> = optional(color("reflectance").fraction()),
+        /// Real part of the index of refraction, per channel; at an angle Fresnel's equations hold.
+        n: Option<[f64; 3]> = optional(color("real part of the index of refraction").up_to(MAX_INDEX)),
+        /// Imaginary part of the index of refraction, per channel.
+        k: Option<[f64; 3]> = optional(color("imaginary part of the index of refraction").up_to(MAX_INDEX)),
+    }
+}
+
+record! {
     /// Smooth glass.
     GlassFile {
         /// Index of refraction.
-        ior: f64 = required(real("index of refraction").above(0.0).at_most(100.0)),
+        ior: f64 = required(real("index of refraction").above(0.0).at_most(MAX_INDEX)),
+        /// Absorption coefficient per channel, m⁻¹: inside, light falls to 1/e over its reciprocal.
+        absorption: [f64; 3] = or(color("absorption per metre"), [0.0; 3]),
     }
 }
 

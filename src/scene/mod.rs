@@ -18,7 +18,7 @@ pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
-pub use material::{Material, Texture};
+pub use material::{Conductor, Material, Texture};
 
 use crate::geometry::{Geometry, Structure};
 use crate::radius::RadiusRule;

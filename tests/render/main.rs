@@ -10,6 +10,7 @@ mod geometry;
 mod geometry_structures;
 mod light_sampling;
 mod lights;
+mod materials;
 mod optics;
 mod photon_map;
 mod plan;

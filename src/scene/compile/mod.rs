@@ -4,18 +4,18 @@
 mod camera;
 mod emission;
 mod light;
+mod material;
 mod mesh;
 mod polygon;
 
 use super::assets::AssetSource;
 use super::file::{
-    AlbedoFile, ImageFile, MaterialFile, ObjectFile, RenderFile, SceneFile, ShapeFile, StopFile,
-    read_scene_file,
+    ImageFile, MaterialFile, ObjectFile, RenderFile, SceneFile, ShapeFile, StopFile, read_scene_file,
 };
 use super::issue::{IssueCode, Issues, SceneErrors};
 use super::json::{ParseError, ParseErrorKind, parse};
 use super::{
-    ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Texture, Tone,
+    ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Tone,
 };
 use crate::geometry::GeometryBuilder;
 use glam::{DVec3, Vec3};
@@ -97,8 +97,8 @@ struct Compiler<'f> {
 impl<'f> Compiler<'f> {
     fn materials(&mut self, materials: &'f [(String, Option<MaterialFile>)]) {
         for (name, material) in materials {
-            if let Some(material) = material {
-                let id = self.add_material(compile_material(material));
+            if let Some(material) = material.as_ref().and_then(|m| self.material(name, m)) {
+                let id = self.add_material(material);
                 self.material_ids.insert(name, id);
             }
         }
@@ -168,21 +168,6 @@ fn image_settings(image: Option<&ImageFile>) -> ImageSettings {
             ImageSettings { width: *width, height: *height, exposure: *exposure as f32, tone: *tone }
         }
         None => ImageSettings { width: 640, height: 480, exposure: 0.0, tone: Tone::Linear },
-    }
-}
-
-fn compile_material(material: &MaterialFile) -> Material {
-    match material {
-        MaterialFile::Diffuse(diffuse) => Material::Diffuse {
-            albedo: match &diffuse.albedo {
-                AlbedoFile::Color(color) => Texture::Constant(vec3(*color)),
-                AlbedoFile::Checker(checker) => {
-                    Texture::Checker { colors: checker.colors.map(vec3), size: checker.size as f32 }
-                }
-            },
-        },
-        MaterialFile::Mirror(mirror) => Material::Mirror { reflectance: vec3(mirror.reflectance) },
-        MaterialFile::Glass(glass) => Material::Glass { ior: glass.ior as f32 },
     }
 }
 
