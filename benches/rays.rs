@@ -5,7 +5,7 @@
 
 use criterion::{Criterion, Throughput};
 use glam::{Vec3, Vec3A};
-use nephroid::geometry::{Geometry, GeometryBuilder, MeshData, Ray, offset_origin};
+use nephroid::geometry::{Geometry, GeometryBuilder, MeshData, Ray, Structure, offset_origin};
 use nephroid::sampling::{SamplePoint, uniform_sphere};
 use nephroid::scene::ObjectId;
 use obvhs::BvhBuildParams;
@@ -30,10 +30,51 @@ fn main() {
 }
 
 fn rays(criterion: &mut Criterion) {
+    for count in [1, 2, 4, 8, 16] {
+        bench_handful(criterion, count);
+    }
     for (name, cells) in [("10k", 70_u16), ("100k", 223), ("1M", 707)] {
         bench_mesh(criterion, &format!("terrain{name}"), &terrain(cells));
         bench_mesh(criterion, &format!("ball{name}"), &ball(cells));
     }
+}
+
+/// A handful of spheres and squares, where a list competes with the hierarchy.
+fn bench_handful(criterion: &mut Criterion, count: u32) {
+    let fill = |structure| {
+        let mut builder = GeometryBuilder::default();
+        for i in 0..count {
+            let at = uniform_sphere(SamplePoint::new(7, i).get_2d(0));
+            if i.is_multiple_of(2) {
+                builder.sphere(ObjectId(i), at, 0.4);
+                continue;
+            }
+            let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)];
+            let outline = corners.map(|(x, z)| at + Vec3::new(x, 0.0, z)).to_vec();
+            builder.polygon(ObjectId(i), &[outline]).expect("a square is a polygon");
+        }
+        builder.build_as(structure)
+    };
+    let rays = RaySet::new(&fill(Structure::List));
+    let mut group = criterion.benchmark_group(format!("handful{count}"));
+    for (name, structure) in [("list", Structure::List), ("bvh", Structure::Bvh)] {
+        let geometry = fill(structure);
+        group.throughput(Throughput::Elements(rays.primary.len() as u64));
+        group.bench_function(format!("primary/{name}"), |b| {
+            b.iter(|| {
+                rays.primary
+                    .iter()
+                    .filter_map(|r| geometry.closest_hit(black_box(r)))
+                    .map(|h| h.t)
+                    .sum::<f32>()
+            });
+        });
+        group.throughput(Throughput::Elements(rays.shadow.len() as u64));
+        group.bench_function(format!("shadow/{name}"), |b| {
+            b.iter(|| rays.shadow.iter().filter(|(r, t)| geometry.any_hit(black_box(r), *t)).count());
+        });
+    }
+    group.finish();
 }
 
 fn bench_mesh(criterion: &mut Criterion, name: &str, mesh: &MeshData) {

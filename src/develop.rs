@@ -2,6 +2,7 @@
 
 use crate::image_io::LinearImage;
 use crate::scene::{ImageSettings, Tone};
+use std::sync::LazyLock;
 
 /// The picture as 8-bit sRGB, three bytes per pixel, top row first. Pixels must be finite; NaN becomes 0.
 #[must_use]
@@ -12,7 +13,7 @@ pub fn develop(image: &LinearImage, settings: &ImageSettings) -> Vec<u8> {
             Tone::Linear => f64::from(*x) * gain,
             Tone::Filmic => filmic(f64::from(*x) * gain),
         };
-        to_byte(linear_to_srgb(shown.clamp(0.0, 1.0)))
+        to_byte(shown)
     };
     image.pixels.iter().flatten().map(encode).collect()
 }
@@ -24,16 +25,17 @@ fn filmic(x: f64) -> f64 {
     (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)
 }
 
-/// The sRGB curve (IEC 61966-2-1), 0..1 to 0..1.
-fn linear_to_srgb(x: f64) -> f64 {
-    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::pow(x, 1.0 / 2.4) - 0.055 }
+/// The nearest code of the sRGB curve, by looking for the value among those at which the code changes: exact,
+/// and several times as fast as the curve's power.
+fn to_byte(linear: f64) -> u8 {
+    THRESHOLDS.partition_point(|&threshold| threshold <= linear) as u8
 }
 
-fn to_byte(x: f64) -> u8 {
-    (x * 255.0).round() as u8
-}
+/// The linear values from which on the codes 1 to 255 are nearest.
+static THRESHOLDS: LazyLock<[f64; 255]> =
+    LazyLock::new(|| std::array::from_fn(|code| srgb_to_linear((code as f64 + 0.5) / 255.0)));
 
-/// The inverse of the sRGB curve, 0..1 to 0..1.
+/// The inverse of the sRGB curve (IEC 61966-2-1), 0..1 to 0..1.
 #[must_use]
 pub fn srgb_to_linear(x: f64) -> f64 {
     if x <= 0.040_45 { x / 12.92 } else { libm::pow((x + 0.055) / 1.055, 2.4) }

@@ -6,10 +6,10 @@ use crate::light_path::Bounce;
 use crate::pass1_light::{self, Block, Budget, Source, Tally, Window};
 use crate::photon_map;
 use crate::radius::RadiusRule;
-use crate::render::Control;
 use crate::sampling::hash;
 use crate::scene::{Light, LightSampling, Material, Paths, Scene};
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// What a render will do. A pure function of the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +49,7 @@ pub struct Warning {
 }
 
 /// Photons of the first pilot per window; tried again with sixteen times as many where none arrived.
-const PILOT_LOG2: u32 = 12;
+const PILOT_LOG2: u32 = 13;
 
 /// Least photons per window, half and round.
 const LEAST_LOG2: u32 = 8;
@@ -138,7 +138,7 @@ impl Plan {
             return;
         }
         let pilots: Vec<Pilot> =
-            windows.into_iter().enumerate().map(|(i, w)| pilot(scene, w, i as u64)).collect();
+            windows.into_par_iter().enumerate().map(|(i, w)| pilot(scene, w, i as u64)).collect();
         self.budget(scene, pilots);
     }
 
@@ -186,11 +186,12 @@ impl Plan {
         }
         let sent: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
         let kept = self.photons.len();
+        let guided = self.photons.iter().filter(|b| b.window.guide.is_some()).count();
         self.decide(
             "pass 1",
             true,
             format!("{sent} photons a round through {kept} windows"),
-            format!("{kept} of {all} pairs of light and specular object throw light onto a surface; each gets photons by the light it delivers"),
+            format!("{kept} of {all} pairs of light and specular object throw light onto a surface; each gets photons by the light it delivers, {guided} of them through a table of where they arrive from"),
         );
     }
 
@@ -264,19 +265,19 @@ fn sent(pilots: &[Pilot]) -> u64 {
 }
 
 /// Sends a few photons through a window. The count is bounded: a window that delivers nothing is given up.
-fn pilot(scene: &Scene, window: Window, index: u64) -> Pilot {
+fn pilot(scene: &Scene, mut window: Window, index: u64) -> Pilot {
     const PILOT: u64 = 0;
     let seed = hash(hash(scene.render.seed, PILOT), index);
-    let run = |log2: u32| {
-        let block = Block { first: 0, count: 1 << log2, seed };
-        pass1_light::trace_block(scene, &window, block, &Control::new()).map(|(_, t)| t).unwrap_or_default()
+    let run = |window: &Window, log2: u32| {
+        pass1_light::pilot(scene, window, Block { first: 0, count: 1 << log2, seed })
     };
     let mut log2 = PILOT_LOG2;
-    let mut tally = run(log2);
+    let (mut tally, mut guide) = run(&window, log2);
     if tally.stored == 0 {
         log2 += 4;
-        tally = run(log2);
+        (tally, guide) = run(&window, log2);
     }
+    window.guide = guide;
     Pilot { window, tally, sent: 1 << log2 }
 }
 

@@ -180,7 +180,9 @@ pub struct Render {
     eye: EyeCounts,
     /// Traced before the first round that has photons.
     footprints: Footprints,
-    /// The smoothing at the last milestone, and its number of rounds.
+    /// The picture at the last milestone.
+    preview: LinearImage,
+    /// The smoothing then, and its number of rounds.
     smoothing: Option<(u32, Option<Smoothing>)>,
     /// Blocks of photons used up.
     blocks: u32,
@@ -206,6 +208,8 @@ impl Render {
     /// A render that has yet to start.
     #[must_use]
     pub fn new(scene: Arc<Scene>, plan: Plan) -> Self {
+        let preview =
+            LinearImage { width: scene.image.width, height: scene.image.height, pixels: Vec::new() };
         let film = Film::new(scene.image.width, scene.image.height);
         let windows = vec![Tally::default(); plan.photons.len()];
         let time = PassTime::default();
@@ -221,6 +225,7 @@ impl Render {
             blocks: 0,
             footprints: Footprints::default(),
             smoothing: None,
+            preview,
             effort: Effort::default(),
         }
     }
@@ -295,6 +300,7 @@ impl Render {
         let key = hash(self.scene.render.seed, u64::from(self.rounds()));
         self.effort = Effort::decide(&measured, self.plan.most_photon_shift(), key);
         self.error = picture.error_estimate();
+        self.preview = picture.image();
         self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));
     }
 
@@ -357,6 +363,12 @@ impl Render {
         self.picture().image()
     }
 
+    /// The picture at the last of the rounds 1, 2, 3, 4, 6, 8, 12, 16, …: at no cost.
+    #[must_use]
+    pub fn preview(&self) -> LinearImage {
+        if self.preview.pixels.is_empty() { self.image() } else { self.preview.clone() }
+    }
+
     /// The smoothed picture so far, from which image and layers can be had without smoothing again.
     #[must_use]
     pub fn picture(&self) -> Picture<'_> {
@@ -372,6 +384,12 @@ impl Render {
     #[must_use]
     pub fn layer(&self, class: PathClass) -> LinearImage {
         self.picture().layer(class)
+    }
+
+    /// One class of paths as it was gathered: nothing is smoothed.
+    #[must_use]
+    pub fn raw_layer(&self, class: PathClass) -> LinearImage {
+        self.film.raw_layer(class)
     }
 
     /// The scene that is rendered.

@@ -57,7 +57,7 @@ pub struct Settings {
     #[arg(long, env = "NEPHROID_MAX_BODY", default_value = "32M", value_parser = parse_bytes)]
     pub max_body: usize,
     /// Most pixels of one picture
-    #[arg(long, env = "NEPHROID_MAX_PIXELS", default_value_t = 16_777_216)]
+    #[arg(long, env = "NEPHROID_MAX_PIXELS", default_value_t = 8_294_400)]
     pub max_pixels: u64,
     /// Longest rendering time of one job, in seconds
     #[arg(long, env = "NEPHROID_MAX_SECONDS", default_value_t = 600.0, value_parser = parse_seconds)]

@@ -198,7 +198,7 @@ impl RunningRender {
     /// The picture after the finished rounds.
     #[must_use]
     pub fn picture(&self) -> Picture {
-        Picture { image: self.render.image(), settings: self.settings }
+        Picture { image: self.render.preview(), settings: self.settings }
     }
 
     /// What the render counted, as JSON.

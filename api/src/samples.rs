@@ -4,7 +4,7 @@ use include_dir::{Dir, include_dir};
 
 static SCENES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../scenes");
 /// What the scenes look like, for the web page, made by
-/// `nephroid render scenes/NAME.json --size 400x300 --error 0.001 --rounds 64 -o api/web/samples/NAME.png`.
+/// `nephroid render scenes/NAME.json --size 400x300 --error 0.01 --seconds 20 -o api/web/samples/NAME.png`.
 static PICTURES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/web/samples");
 
 /// A sample scene.

@@ -1,13 +1,19 @@
 //! Collects the primitives of a scene.
 
 use super::accel::{Accel, Structure};
+use super::disk::{Cylinder, Disk};
+use super::instance::{Instance, SharedMesh};
 use super::leaves::{Primitives, Shape, Source};
 use super::mesh::{Mesh, MeshData};
 use super::polygon::{Edge, Polygon, PolygonError};
 use super::sphere::Sphere;
 use super::{Bounds, Geometry, Owner};
 use crate::scene::ObjectId;
-use glam::Vec3;
+use glam::{DAffine3, Vec3};
+
+/// A mesh that instances place into the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SharedMeshId(u32);
 
 /// Collects primitives; [`GeometryBuilder::build`] makes the structure over them.
 #[derive(Debug, Default)]
@@ -15,6 +21,10 @@ pub struct GeometryBuilder {
     spheres: Vec<Sphere>,
     polygons: Vec<Polygon>,
     edges: Vec<Edge>,
+    disks: Vec<Disk>,
+    cylinders: Vec<Cylinder>,
+    instances: Vec<Instance>,
+    shared: Vec<SharedMesh>,
     primitives: Primitives,
     owners: Vec<Owner>,
 }
@@ -39,6 +49,30 @@ impl GeometryBuilder {
         Ok(())
     }
 
+    /// Adds a disk. The normal has a direction and the radius is positive.
+    pub fn disk(&mut self, object: ObjectId, center: Vec3, normal: Vec3, radius: f32) {
+        self.disks.push(Disk::new(center, normal, radius));
+        self.other(object, Shape::Disk(self.disks.len() as u32 - 1));
+    }
+
+    /// Adds an open cylinder around the line between two points. The radius is positive.
+    pub fn cylinder(&mut self, object: ObjectId, from: Vec3, to: Vec3, radius: f32) {
+        self.cylinders.push(Cylinder::new(from, to, radius));
+        self.other(object, Shape::Cylinder(self.cylinders.len() as u32 - 1));
+    }
+
+    /// Keeps a mesh for instances; by itself it is not in the scene. Indices are in range.
+    pub fn share(&mut self, mesh: &MeshData) -> SharedMeshId {
+        self.shared.push(SharedMesh::new(mesh));
+        SharedMeshId(self.shared.len() as u32 - 1)
+    }
+
+    /// Adds a shared mesh in one place. The transform can be inverted.
+    pub fn instance(&mut self, object: ObjectId, mesh: SharedMeshId, to_world: DAffine3) {
+        self.instances.push(Instance::new(mesh.0, to_world));
+        self.other(object, Shape::Instance(self.instances.len() as u32 - 1));
+    }
+
     /// Adds a triangle mesh. Indices are in range.
     pub fn mesh(&mut self, object: ObjectId, mesh: &MeshData) {
         let index = self.primitives.meshes.len() as u32;
@@ -47,6 +81,19 @@ impl GeometryBuilder {
         let triangles = 0..mesh.triangles.len() as u32;
         self.primitives.sources.extend(triangles.map(|i| Source::Triangle { mesh: index, index: i }));
         self.primitives.meshes.push(Mesh::new(mesh));
+    }
+
+    /// Number of primitives so far.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.primitives.sources.len()
+    }
+
+    /// Box of the primitives after the first `count`.
+    #[must_use]
+    pub fn bounds_after(&self, count: usize) -> Bounds {
+        let sources = self.primitives.sources.iter().skip(count);
+        sources.fold(Bounds::EMPTY, |all, source| all.union(self.bounds_of(*source)))
     }
 
     fn other(&mut self, object: ObjectId, shape: Shape) {
@@ -81,6 +128,10 @@ impl GeometryBuilder {
             spheres: self.spheres,
             polygons: self.polygons,
             edges: self.edges,
+            disks: self.disks,
+            cylinders: self.cylinders,
+            instances: self.instances,
+            shared: self.shared,
             meshes: self.primitives.meshes,
             leaves,
             owners: self.owners,
@@ -98,6 +149,9 @@ impl GeometryBuilder {
             }
             Source::Other(Shape::Sphere(i)) => self.spheres[i as usize].bounds(),
             Source::Other(Shape::Polygon(i)) => self.polygons[i as usize].bounds(),
+            Source::Other(Shape::Disk(i)) => self.disks[i as usize].bounds(),
+            Source::Other(Shape::Cylinder(i)) => self.cylinders[i as usize].bounds(),
+            Source::Other(Shape::Instance(i)) => self.instances[i as usize].bounds(&self.shared),
         }
     }
 }

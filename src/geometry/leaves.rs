@@ -29,6 +29,9 @@ pub(super) struct Entry {
 pub(super) enum Shape {
     Sphere(u32),
     Polygon(u32),
+    Disk(u32),
+    Cylinder(u32),
+    Instance(u32),
 }
 
 /// A child of a node in one word.

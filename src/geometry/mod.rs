@@ -4,7 +4,9 @@ mod accel;
 mod bounds;
 mod builder;
 mod bvh;
+mod disk;
 mod grid;
+mod instance;
 mod leaves;
 mod mesh;
 mod nearest;
@@ -17,7 +19,7 @@ mod sphere_tree;
 
 pub use accel::Structure;
 pub use bounds::Bounds;
-pub use builder::GeometryBuilder;
+pub use builder::{GeometryBuilder, SharedMeshId};
 pub use mesh::MeshData;
 pub use polygon::PolygonError;
 pub use ray::{Ray, offset_origin};
@@ -25,7 +27,9 @@ pub use sphere::roots as sphere_roots;
 
 use crate::scene::ObjectId;
 use accel::Accel;
+use disk::{Cylinder, Disk};
 use glam::{Vec2, Vec3};
+use instance::{Instance, SharedMesh};
 use leaves::{Child, Entry, Leaves, Run, Shape, Word};
 use mesh::Mesh;
 use nearest::{Nearest, Place};
@@ -44,6 +48,10 @@ pub struct Geometry {
     spheres: Vec<Sphere>,
     polygons: Vec<Polygon>,
     edges: Vec<Edge>,
+    disks: Vec<Disk>,
+    cylinders: Vec<Cylinder>,
+    instances: Vec<Instance>,
+    shared: Vec<SharedMesh>,
     meshes: Vec<Mesh>,
     /// The primitives in the order of the structure.
     leaves: Leaves,
@@ -135,6 +143,13 @@ impl Geometry {
             Place::Entry(entry) => match self.leaves.entries[entry as usize].shape {
                 Shape::Sphere(i) => self.spheres[i as usize].surface(ray, nearest.t),
                 Shape::Polygon(i) => self.polygons[i as usize].surface(ray, nearest.t),
+                Shape::Disk(i) => self.disks[i as usize].surface(ray),
+                Shape::Cylinder(i) => self.cylinders[i as usize].surface(ray),
+                Shape::Instance(_) => return None,
+            },
+            Place::Instance(entry, slot) => match self.leaves.entries[entry as usize].shape {
+                Shape::Instance(i) => self.instances[i as usize].surface(ray, slot, &self.shared)?,
+                Shape::Sphere(_) | Shape::Polygon(_) | Shape::Disk(_) | Shape::Cylinder(_) => return None,
             },
             Place::Triangle(slot) => {
                 let triangle = self.leaves.triangle(slot);
@@ -150,35 +165,39 @@ impl Geometry {
     /// True if any surface lies strictly between the ray's origin and the distance `t_max`.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray, t_max: f32) -> bool {
-        let others = |run: Run| self.entries(run).any(|(_, e)| self.meets(e, ray, t_max).is_some());
+        let others = |run: Run| self.entries(run).any(|(_, e)| self.meets(e, ray, t_max));
         match &self.accel {
             Accel::List(words) => self.any_of_list(words, ray, t_max),
             Accel::Bvh(bvh) => bvh.any(&self.leaves, ray, t_max, others),
             Accel::Grid(grid) => {
                 let sheared = ShearedRay::new(ray);
-                grid.any(ray, t_max, |place| self.place_meets(place, ray, &sheared, t_max).is_some())
+                grid.any(ray, t_max, |place| self.place_meets(place, ray, &sheared, t_max))
             }
             Accel::Spheres(tree) => {
                 let sheared = ShearedRay::new(ray);
-                tree.any(ray, t_max, |place| self.place_meets(place, ray, &sheared, t_max).is_some())
+                tree.any(ray, t_max, |place| self.place_meets(place, ray, &sheared, t_max))
             }
         }
     }
 
     fn closest_of_place(&self, place: Place, ray: &Ray, sheared: &ShearedRay, nearest: &mut Nearest) {
-        if let Some(t) = self.place_meets(place, ray, sheared, nearest.limit()) {
-            let primitive = match place {
-                Place::Triangle(slot) => self.leaves.number(slot),
-                Place::Entry(entry) => self.leaves.entries[entry as usize].primitive,
-            };
-            nearest.offer(t, primitive, place);
+        match place {
+            Place::Triangle(slot) => {
+                let hit = self.leaves.triangle(slot).intersect(sheared, nearest.limit());
+                hit.into_iter().for_each(|(t, _)| nearest.offer(t, self.leaves.number(slot), place));
+            }
+            Place::Entry(entry) | Place::Instance(entry, _) => {
+                self.closest_of_run(Run { first: entry as usize, count: 1 }, ray, nearest);
+            }
         }
     }
 
-    fn place_meets(&self, place: Place, ray: &Ray, sheared: &ShearedRay, t_max: f32) -> Option<f32> {
+    fn place_meets(&self, place: Place, ray: &Ray, sheared: &ShearedRay, t_max: f32) -> bool {
         match place {
-            Place::Triangle(slot) => self.leaves.triangle(slot).intersect(sheared, t_max).map(|(t, _)| t),
-            Place::Entry(entry) => self.meets(&self.leaves.entries[entry as usize], ray, t_max),
+            Place::Triangle(slot) => self.leaves.triangle(slot).intersect(sheared, t_max).is_some(),
+            Place::Entry(entry) | Place::Instance(entry, _) => {
+                self.meets(&self.leaves.entries[entry as usize], ray, t_max)
+            }
         }
     }
 
@@ -201,7 +220,7 @@ impl Geometry {
         let sheared = ShearedRay::new(ray);
         words.iter().any(|word| match word.child() {
             Child::Packet(index) => self.leaves.packets[index].any_one_by_one(&sheared, t_max),
-            Child::Run(run) => self.entries(run).any(|(_, e)| self.meets(e, ray, t_max).is_some()),
+            Child::Run(run) => self.entries(run).any(|(_, e)| self.meets(e, ray, t_max)),
             Child::Node(_) => false,
         })
     }
@@ -209,8 +228,21 @@ impl Geometry {
     #[inline]
     fn closest_of_run(&self, run: Run, ray: &Ray, nearest: &mut Nearest) {
         for (index, entry) in self.entries(run) {
-            if let Some(t) = self.meets(entry, ray, nearest.limit()) {
-                nearest.offer(t, entry.primitive, Place::Entry(index as u32));
+            let (t_max, index) = (nearest.limit(), index as u32);
+            let (hit, place) = match entry.shape {
+                Shape::Sphere(i) => (self.spheres[i as usize].intersect(ray, t_max), Place::Entry(index)),
+                Shape::Polygon(i) => {
+                    (self.polygons[i as usize].intersect(ray, t_max, &self.edges), Place::Entry(index))
+                }
+                Shape::Disk(i) => (self.disks[i as usize].intersect(ray, t_max), Place::Entry(index)),
+                Shape::Cylinder(i) => (self.cylinders[i as usize].intersect(ray, t_max), Place::Entry(index)),
+                Shape::Instance(i) => {
+                    let hit = self.instances[i as usize].intersect(ray, t_max, &self.shared);
+                    (hit.map(|(t, _)| t), Place::Instance(index, hit.map_or(0, |(_, slot)| slot)))
+                }
+            };
+            if let Some(t) = hit {
+                nearest.offer(t, entry.primitive, place);
             }
         }
     }
@@ -221,10 +253,13 @@ impl Geometry {
     }
 
     #[inline]
-    fn meets(&self, entry: &Entry, ray: &Ray, t_max: f32) -> Option<f32> {
+    fn meets(&self, entry: &Entry, ray: &Ray, t_max: f32) -> bool {
         match entry.shape {
-            Shape::Polygon(i) => self.polygons[i as usize].intersect(ray, t_max, &self.edges),
-            Shape::Sphere(i) => self.spheres[i as usize].intersect(ray, t_max),
+            Shape::Polygon(i) => self.polygons[i as usize].intersect(ray, t_max, &self.edges).is_some(),
+            Shape::Sphere(i) => self.spheres[i as usize].intersect(ray, t_max).is_some(),
+            Shape::Disk(i) => self.disks[i as usize].intersect(ray, t_max).is_some(),
+            Shape::Cylinder(i) => self.cylinders[i as usize].intersect(ray, t_max).is_some(),
+            Shape::Instance(i) => self.instances[i as usize].any(ray, t_max, &self.shared),
         }
     }
 
@@ -234,21 +269,35 @@ impl Geometry {
         self.owners[after - 1]
     }
 
-    /// Polygons are sheets of their own, since each clips the kernel at its own outline; an object's
-    /// triangles form one sheet, and a sphere is one.
+    /// What has a border is a sheet of its own, since each clips the kernel at its own outline; an object's
+    /// triangles form one sheet, and a sphere is one. Polygons come first, then disks, cylinders and objects.
     fn sheet(&self, place: Place, object: ObjectId) -> SheetId {
-        if let Place::Entry(entry) = place
-            && let Shape::Polygon(i) = self.leaves.entries[entry as usize].shape
-        {
-            return SheetId(i);
-        }
-        SheetId(self.polygons.len() as u32 + object.0)
+        let (polygons, disks) = (self.polygons.len() as u32, self.disks.len() as u32);
+        let rest = polygons + disks + self.cylinders.len() as u32 + object.0;
+        SheetId(match place {
+            Place::Entry(entry) => match self.leaves.entries[entry as usize].shape {
+                Shape::Polygon(i) => i,
+                Shape::Disk(i) => polygons + i,
+                Shape::Cylinder(i) => polygons + disks + i,
+                Shape::Sphere(_) | Shape::Instance(_) => rest,
+            },
+            Place::Triangle(_) | Place::Instance(..) => rest,
+        })
     }
 
     /// Share of the density estimate's kernel around `point` that lies on the sheet (1 where unknown).
     #[must_use]
     pub fn kernel_mass(&self, sheet: SheetId, point: Vec3, radius: f32) -> f32 {
-        self.polygons.get(sheet.0 as usize).map_or(1.0, |p| p.kernel_mass(point, radius, &self.edges))
+        let index = sheet.0 as usize;
+        if let Some(polygon) = self.polygons.get(index) {
+            return polygon.kernel_mass(point, radius, &self.edges);
+        }
+        let index = index - self.polygons.len();
+        if let Some(disk) = self.disks.get(index) {
+            return disk.kernel_mass(point, radius);
+        }
+        let cylinder = self.cylinders.get(index - self.disks.len());
+        cylinder.map_or(1.0, |cylinder| cylinder.kernel_mass(point, radius))
     }
 
     /// Box of one object.
@@ -268,6 +317,9 @@ impl Geometry {
                     hull.push(HullPoint { position: center, radius });
                 }
                 Shape::Polygon(i) => hull.extend(self.polygons[i as usize].corners().iter().map(point)),
+                Shape::Disk(i) => hull.extend(self.disks[i as usize].hull()),
+                Shape::Cylinder(i) => hull.extend(self.cylinders[i as usize].hull()),
+                Shape::Instance(i) => hull.extend(self.instances[i as usize].hull(&self.shared)),
             }
         }
         for owner in self.owners.iter().filter(|o| o.object == object) {
@@ -308,6 +360,10 @@ impl Geometry {
         let arrays = size_of_val(&self.spheres[..])
             + size_of_val(&self.polygons[..])
             + size_of_val(&self.edges[..])
+            + size_of_val(&self.disks[..])
+            + size_of_val(&self.cylinders[..])
+            + size_of_val(&self.instances[..])
+            + self.shared.iter().map(SharedMesh::memory_bytes).sum::<usize>()
             + size_of_val(&self.owners[..])
             + self.meshes.iter().map(Mesh::memory_bytes).sum::<usize>();
         (arrays + self.leaves.memory_bytes() + self.accel.memory_bytes()) as u64

@@ -7,6 +7,8 @@ pub(super) enum Place {
     Triangle(u32),
     /// Index among the other primitives.
     Entry(u32),
+    /// Index of an instance among the other primitives, and the slot of a triangle in its mesh.
+    Instance(u32, u32),
 }
 
 /// The nearest hit so far. Of two at the same distance the primitive that came first in the scene counts, so

@@ -190,7 +190,7 @@ impl Polygon {
 
 /// Mass of the 2-D Epanechnikov kernel of radius 1 on the side of a line at distance `s` that holds its
 /// centre: 1/2 + ∫₀ˢ (8/3π)(1-x²)^{3/2} dx.
-fn epanechnikov_half_plane(s: f64) -> f64 {
+pub(super) fn epanechnikov_half_plane(s: f64) -> f64 {
     let s = s.clamp(0.0, 1.0);
     let root = (1.0 - s * s).sqrt();
     let integral = (s * root * (5.0 - 2.0 * s * s) + 3.0 * libm::asin(s)) / 8.0;

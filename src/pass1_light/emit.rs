@@ -60,8 +60,11 @@ impl<'a> Emission<'a> {
     /// Draws a photon; `None` where the light gives nothing in the drawn direction.
     #[must_use]
     pub fn sample(&self, sample: SamplePoint) -> Option<EmittedPhoton> {
-        let through = sample.get_2d(0);
-        let photon = match &self.source {
+        let (through, density) = match &self.window.guide {
+            Some(guide) => guide.warp(sample.get_2d(0)),
+            None => (sample.get_2d(0), 1.0),
+        };
+        let mut photon = match &self.source {
             Sampler::Environment(radiance) => {
                 self.emit_from_environment(*radiance, through, sample.get_2d(2))
             }
@@ -87,6 +90,7 @@ impl<'a> Emission<'a> {
             }
             Sampler::Light(Light::Sphere(sphere)) => self.emit_from_sphere(sphere, through, sample.get_2d(2)),
         }?;
+        photon.power /= density;
         (photon.power.max_element() > 0.0).then_some(photon)
     }
 

@@ -3,17 +3,20 @@
 
 mod emit;
 mod energy;
+mod guide;
 mod walk;
 mod window;
 
 pub use emit::Emission;
 pub use energy::{Energy, Tally};
+pub use guide::Guide;
 pub use window::{Region, Source, Window, windows};
 
 use crate::photon_map::{Photon, PhotonMap};
 use crate::render::{Control, RenderError};
 use crate::sampling::{SamplePoint, hash};
 use crate::scene::Scene;
+use guide::Lesson;
 use rayon::prelude::*;
 use walk::{Fate, walk};
 
@@ -157,4 +160,23 @@ fn trace_batch(
         }
     }
     (photons, tally)
+}
+
+/// Sends a block of pilot photons through a window, and learns where those come from that arrive.
+#[must_use]
+pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Guide>) {
+    let emission = Emission::new(scene, window);
+    let mut lesson = Lesson::new();
+    let mut tally = Tally::default();
+    for i in 0..block.count {
+        let sample = SamplePoint::new(block.seed, block.first.wrapping_add(i));
+        tally.sent += 1;
+        let Some(mut photon) = emission.sample(sample) else { continue };
+        photon.power /= block.count as f32;
+        tally.energy.emitted += photon.power.as_dvec3();
+        if let Fate::Stored(stored) = walk(scene, emission.caster(), photon, sample, &mut tally) {
+            lesson.delivered(sample.get_2d(0), stored.power.element_sum());
+        }
+    }
+    (tally, lesson.learn())
 }

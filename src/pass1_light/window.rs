@@ -3,6 +3,7 @@
 //! A photon drawn for a window counts only if the first surface it meets is that object, so that windows may
 //! overlap and no light is counted twice.
 
+use super::guide::Guide;
 use crate::geometry::{Bounds, Geometry, HullPoint};
 use crate::light_path::Bounce;
 use crate::scene::{Light, LightId, ObjectId, Scene, SphereLight};
@@ -26,6 +27,8 @@ pub struct Window {
     pub caster: ObjectId,
     /// The bound.
     pub region: Region,
+    /// Where in it the photons come from that arrive, if a pilot has found that out.
+    pub guide: Option<Guide>,
 }
 
 /// The shape of a window.
@@ -82,7 +85,7 @@ pub fn windows(scene: &Scene) -> Vec<Window> {
                 Source::Light(id) => region(&scene.lights[id.index()], &scene.geometry, caster, hull),
                 Source::Environment => enclosing_disc(&scene.geometry, caster),
             };
-            windows.push(Window { source, caster, region });
+            windows.push(Window { source, caster, region, guide: None });
         }
     }
     windows

@@ -4,11 +4,12 @@
 
 use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
+use super::light_file::LightFile;
 use super::read::{
-    Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, list, name, named, note_duplicates,
-    object, optional, or, pair, part, point, real, record, reference, required, seed, size2, slots, tagged,
-    triangle, uv,
+    Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, name, named, note_duplicates,
+    object, optional, or, pair, part, point, real, record, reference, required, seed, slots, tagged,
 };
+use super::shape_file::ShapeFile;
 use super::{LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
@@ -211,144 +212,6 @@ record! {
         ..
         /// Its shape.
         shape: ShapeFile
-    }
-}
-
-tagged! {
-    /// A shape.
-    ShapeFile {
-        "sphere" => Sphere(SphereFile),
-        "polygon" => Polygon(PolygonFile),
-        "mesh" => Mesh(MeshFile),
-    }
-}
-
-record! {
-    /// A sphere.
-    SphereFile {
-        /// Centre.
-        center: [f64; 3] = required(point()),
-        /// Radius.
-        radius: f64 = required(real("radius in metres").positive_length()),
-    }
-}
-
-record! {
-    /// A planar polygon, convex or not.
-    PolygonFile {
-        /// The outline, anticlockwise seen from the front.
-        vertices: Vec<[f64; 3]> = required(list(3, point())),
-        /// Outlines of holes, in either order.
-        holes: Vec<Vec<[f64; 3]>> = or(list(0, list(3, point())), Vec::new()),
-    }
-}
-
-record! {
-    /// A triangle mesh, here or in a file of its own.
-    MeshFile {
-        /// A PLY or OBJ file.
-        asset: Option<String> = optional(name()),
-        /// Positions of the vertices.
-        positions: Option<Vec<[f64; 3]>> = optional(list(3, point())),
-        /// Three indices of vertices per triangle.
-        triangles: Option<Vec<[u32; 3]>> = optional(list(1, triangle())),
-        /// A normal per vertex.
-        normals: Option<Vec<[f64; 3]>> = optional(list(3, direction())),
-        /// Texture coordinates per vertex.
-        uvs: Option<Vec<[f64; 2]>> = optional(list(3, uv())),
-    }
-}
-
-tagged! {
-    /// A light.
-    LightFile {
-        "point" => Point(PointLightFile),
-        "spot" => Spot(SpotLightFile),
-        "directional" => Directional(DirectionalLightFile),
-        "quad" => Quad(QuadLightFile),
-        "disk" => Disk(DiskLightFile),
-        "sphere" => Sphere(SphereLightFile),
-    }
-}
-
-record! {
-    /// A light that is a point.
-    PointLightFile {
-        /// Where it is.
-        position: [f64; 3] = required(point()),
-        /// Radiant intensity, W·sr⁻¹.
-        intensity: [f64; 3] = required(color("intensity")),
-    }
-}
-
-record! {
-    /// A point whose light is confined to a cone. With s = (cos θ - cos outer/2) / (cos inner/2 - cos outer/2),
-    /// limited to 0..1, the intensity at an angle θ from the axis is s² (3 - 2s) times that on the axis.
-    SpotLightFile {
-        /// Where it is.
-        position: [f64; 3] = required(point()),
-        /// Direction of the axis; either this or `towards`.
-        direction: Option<[f64; 3]> = optional(direction()),
-        /// A point on the axis; either this or `direction`.
-        towards: Option<[f64; 3]> = optional(point()),
-        /// Radiant intensity on the axis, W·sr⁻¹.
-        intensity: [f64; 3] = required(color("intensity")),
-        /// Opening angle of the cone beyond which there is no light, from side to side, in degrees.
-        outer: f64 = required(real("opening angle in degrees").above(0.0).at_most(180.0)),
-        /// Opening angle of the cone within which the light is full, in degrees; 0.8 of `outer` if left out.
-        inner: Option<f64> = optional(real("opening angle in degrees").between(0.0, 180.0)),
-    }
-}
-
-record! {
-    /// Parallel light.
-    DirectionalLightFile {
-        /// The direction in which the light travels.
-        direction: [f64; 3] = required(direction()),
-        /// Irradiance on a surface that faces the light, W·m⁻².
-        irradiance: [f64; 3] = required(color("irradiance")),
-    }
-}
-
-record! {
-    /// A rectangle that emits to one side.
-    QuadLightFile {
-        /// Centre.
-        center: [f64; 3] = required(point()),
-        /// Width and height.
-        size: [f64; 2] = required(size2()),
-        /// A point the light faces.
-        towards: [f64; 3] = required(point()),
-        /// Direction of the width; horizontal if left out.
-        edge: Option<[f64; 3]> = optional(direction()),
-        /// Radiance, W·sr⁻¹·m⁻².
-        radiance: [f64; 3] = required(color("radiance")),
-    }
-}
-
-record! {
-    /// A disk that emits to one side.
-    DiskLightFile {
-        /// Centre.
-        center: [f64; 3] = required(point()),
-        /// Radius in metres.
-        radius: f64 = required(real("radius in metres").positive_length()),
-        /// A point the light faces.
-        towards: [f64; 3] = required(point()),
-        /// Radiance, W·sr⁻¹·m⁻².
-        radiance: [f64; 3] = required(color("radiance")),
-    }
-}
-
-record! {
-    /// A sphere that emits outwards.
-    SphereLightFile {
-        /// Centre.
-        center: [f64; 3] = required(point()),
-        /// Radius in metres.
-        radius: f64 = required(real("radius in metres").positive_length()),
-        /// Radiance, W·sr⁻¹·m⁻².
-        radiance: [f64; 3] = required(color("radiance")),
     }
 }
 

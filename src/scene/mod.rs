@@ -10,9 +10,11 @@ mod file;
 mod issue;
 mod json;
 mod light;
+mod light_file;
 mod material;
 mod mesh_file;
 mod read;
+mod shape_file;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection};

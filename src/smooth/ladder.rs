@@ -135,33 +135,34 @@ fn cost(level: usize, levels: &[Filtered], weights: &[f32], size: (usize, usize)
     Cost { bias: plane(&bias), noise: plane(&noise) }
 }
 
-/// From large windows to small, the width with the least estimated error.
+/// From large windows to small, the width with the least estimated error; one choice for every 2 × 2 pixels.
 fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -> Vec<Choice> {
     let (width, height) = (counts.width, counts.height);
-    let rows: Vec<Vec<Choice>> = (0..height)
+    let widest = &levels[LEVELS.len() - 1].halves;
+    let lit = |i: usize| weights[i] > 0.0 && (widest[0][i] != Vec3::ZERO || widest[1][i] != Vec3::ZERO);
+    let row_pairs: Vec<Vec<Choice>> = (0..height.div_ceil(2))
         .into_par_iter()
-        .map(|y| {
-            let choose_one = |x: usize| {
-                let i = y * width + x;
-                let widest = &levels[LEVELS.len() - 1].halves;
-                let dark = widest[0][i] == Vec3::ZERO && widest[1][i] == Vec3::ZERO;
-                if weights[i] == 0.0 || dark {
-                    return Choice {
-                        irradiance: 0.5 * (levels[0].halves[0][i] + levels[0].halves[1][i]),
-                        squared_error: 0.0,
-                    };
+        .map(|pair| {
+            let rows = 2 * pair..(2 * pair + 2).min(height);
+            let mut choices = vec![Choice::default(); rows.len() * width];
+            for x in (0..width).step_by(2) {
+                let columns = x..(x + 2).min(width);
+                let block = rows.clone().flat_map(|y| columns.clone().map(move |x| y * width + x));
+                if !block.clone().any(lit) {
+                    continue;
                 }
-                let (level, relative) = choose_level(costs, counts, (x, y));
+                let (level, relative) = choose_level(costs, counts, (x, rows.start));
                 let halves = &levels[level].halves;
-                Choice {
-                    irradiance: 0.5 * (halves[0][i] + halves[1][i]),
-                    squared_error: relative / weights[i],
+                for i in block.filter(|&i| weights[i] > 0.0) {
+                    let irradiance = 0.5 * (halves[0][i] + halves[1][i]);
+                    choices[i - rows.start * width] =
+                        Choice { irradiance, squared_error: relative / weights[i] };
                 }
-            };
-            (0..width).map(choose_one).collect()
+            }
+            choices
         })
         .collect();
-    rows.concat()
+    row_pairs.concat()
 }
 
 /// The chosen width at a pixel and its estimated weighted squared error.

@@ -34,7 +34,7 @@ fn t12_a_slab_transmits_all_orders_of_internal_reflection() {
     };
     let objects = json!([floor(1.0, 0.0), face(top, 1.0), face(bottom, -1.0)]);
     let slab = scene(camera_above([0.0; 3], 0.5, 0.4), objects, sun());
-    let estimate = over_seeds(|seed| mean_irradiance(&render(&slab, seed, 4, 14), PathClass::Caustic));
+    let estimate = over_seeds(|seed| mean_irradiance(&render(&slab, seed, 1, 16), PathClass::Caustic));
     estimate.assert_is(2.0 * 1.5 / (1.5 * 1.5 + 1.0), 0.0);
 }
 
@@ -53,12 +53,12 @@ fn t24_a_plane_mirror_lights_the_floor_like_the_lights_image() {
     assert!((image_source(0.5, 0.0) - 0.153_609_285_1).abs() < 1e-9);
     let lit =
         scene(camera_above([0.5, 0.0, 0.0], 3.0, width), json!([floor(2.0, 0.0), mirror]), lights.clone());
-    let estimate = over_seeds(|seed| mean_irradiance(&render(&lit, seed, 8, 15), PathClass::Caustic));
+    let estimate = over_seeds(|seed| mean_irradiance(&render(&lit, seed, 1, 17), PathClass::Caustic));
     estimate.assert_is(mean_over_square(0.5, 0.0, width, image_source), 0.0);
     // The mirror's outline projects to |z| = 2 - x: beyond it there is nothing.
     let camera = camera_above([0.5, 0.0, 1.8], 3.0, width);
     let dark = scene(camera, json!([floor(2.0, 0.0), mirror]), lights);
-    assert_eq!(mean_irradiance(&render(&dark, 1, 4, 15), PathClass::Caustic), 0.0);
+    assert_eq!(mean_irradiance(&render(&dark, 1, 1, 17), PathClass::Caustic), 0.0);
 }
 
 /// T25, F60: a ball of index 1 bends nothing, so that the floor is lit as if it were not there: photons bring
@@ -75,10 +75,10 @@ fn t25_f60_glass_of_index_one_is_not_there() {
     let with = scene(camera(), json!([floor(2.0, 0.0), ball]), lights.clone());
     let without = scene(camera(), json!([floor(2.0, 0.0)]), lights);
     let expected = mean(&render(&without, 1, 8, 8).image());
-    let estimate = over_seeds(|seed| mean(&render(&with, seed, 8, 14).image()));
+    let estimate = over_seeds(|seed| mean(&render(&with, seed, 1, 16).image()));
     // The kernel's blur carries light over the shadow's edge in both directions alike.
     estimate.assert_is(expected, 1e-3);
-    let caustic = mean(&render(&with, 1, 8, 14).layer(PathClass::Caustic));
+    let caustic = mean(&render(&with, 1, 1, 16).layer(PathClass::Caustic));
     assert!(caustic > 0.1 * expected, "the ball's shadow is in the picture: {caustic} of {expected}");
 }
 
@@ -210,7 +210,7 @@ fn t29_the_nephroid_has_the_known_brightness_on_its_axis() {
     for (x, concentration) in [(0.25, 2.0), (0.75, 3.6)] {
         let camera = camera_above([x, 0.0, 0.0], 3.0, 0.04);
         let scene = scene(camera, json!([floor(1.5, 0.0), cup]), lights.clone());
-        let estimate = over_seeds(|seed| mean_irradiance(&render(&scene, seed, 4, 16), PathClass::Caustic));
+        let estimate = over_seeds(|seed| mean_irradiance(&render(&scene, seed, 1, 18), PathClass::Caustic));
         // The formula's s tan a ≪ 1, its curvature over the square, and the kernel leave 1 %.
         estimate.assert_is(concentration * 0.9 * elevation.sin(), 0.01);
     }

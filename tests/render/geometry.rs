@@ -79,7 +79,7 @@ fn polygon(outlines: &[&[[f32; 2]]]) -> Geometry {
     let mut builder = GeometryBuilder::default();
     let outlines: Vec<Vec<Vec3>> =
         outlines.iter().map(|o| o.iter().map(|&[x, z]| Vec3::new(x, 0.0, -z)).collect()).collect();
-    builder.polygon(ObjectId(0), &outlines).unwrap();
+    builder.polygon(ObjectId(0), &outlines).expect("the outlines span a plane");
     builder.build()
 }
 

@@ -83,7 +83,12 @@ fn emissive_objects_light_like_lights_of_their_shape() {
     let mesh = json!({ "type": "mesh", "material": "floor", "emission": [1, 1, 1], "positions": corners,
                        "triangles": [[0, 1, 2], [0, 2, 3]] });
     let sphere = json!({ "type": "sphere", "material": "floor", "emission": [1, 1, 1], "center": [0, 2, 0], "radius": 1 });
-    for (object, known) in [(polygon, 1.740_839_503), (mesh, 1.740_839_503), (sphere, PI / 4.0)] {
+    let disk = json!({ "type": "disk", "material": "floor", "emission": [1, 1, 1], "center": [0, 1, 0], "normal": [0, -1, 0], "radius": 1 });
+    let block = json!({ "type": "box", "material": "floor", "emission": [1, 1, 1], "center": [0, 1.5, 0], "size": [2, 1, 2] });
+    let square = 1.740_839_503;
+    for (object, known) in
+        [(polygon, square), (mesh, square), (block, square), (sphere, PI / 4.0), (disk, PI / 2.0)]
+    {
         let value =
             |object: &Value, camera: Value| scene(camera, json!([floor(4.0, 0.0), object]), json!([]));
         let below = value(&object, camera_above([0.0; 3], 0.5, 0.01));
@@ -91,13 +96,23 @@ fn emissive_objects_light_like_lights_of_their_shape() {
             .assert_is(known, 1e-4);
         let above = value(&object, camera_above([0.0, 1.0, 0.0], 4.0, 0.1));
         let seen = mean(&render(&above, 1, 1, 8).layer(PathClass::Emitted));
-        let outside = object["type"] == "sphere";
+        let outside = object["type"] == "sphere" || object["type"] == "box";
         assert!((seen - f64::from(u8::from(outside))).abs() < 1e-6, "{}: {seen}", object["type"]);
     }
-    let mut mirror = json!({ "type": "sphere", "material": "mirror", "center": [0, 2, 0], "radius": 1 });
-    mirror["emission"] = json!([1, 1, 1]);
-    let refused = scene(camera_above([0.0; 3], 0.5, 0.01), json!([mirror]), json!([]));
-    assert!(Scene::from_json(&refused.to_string(), &NoAssets).is_err());
+}
+
+/// What is specular, and shapes without a way to draw their points, are refused as lights.
+#[test]
+fn emission_that_cannot_be_rendered_is_refused() {
+    for object in [
+        json!({ "type": "sphere", "material": "mirror", "center": [0, 2, 0], "radius": 1, "emission": [1, 1, 1] }),
+        json!({ "type": "cylinder", "material": "floor", "from": [0, 1, 0], "to": [0, 2, 0], "radius": 1, "emission": [1, 1, 1] }),
+    ] {
+        let value = scene(camera_above([0.0; 3], 0.5, 0.01), json!([object]), json!([]));
+        let errors = Scene::from_json(&value.to_string(), &NoAssets).expect_err("refused");
+        assert_eq!(errors.issues.len(), 1, "{errors}");
+        assert_eq!(errors.issues[0].pointer, "/objects/0/emission");
+    }
 }
 
 /// `LE`: the eye sees a light's radiance on its front and black behind.

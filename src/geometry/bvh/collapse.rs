@@ -127,7 +127,8 @@ impl Collapse<'_> {
         let node = &self.binary.nodes[index];
         let Some(below) = node.children().filter(|_| depth < SPLIT_DEPTH && !self.costs.leaf[index]) else {
             let (first, count) = (node.first as usize, node.count as usize);
-            return self.by_order(&self.binary.order[first..first + count].to_vec());
+            let numbers = self.binary.order[first..first + count].to_vec();
+            return self.by_order(numbers);
         };
         let mut cut = Vec::with_capacity(8);
         self.split(below, 8, &mut cut);
@@ -158,10 +159,10 @@ impl Collapse<'_> {
     }
 
     /// A leaf, or where there are too many for one, nodes that halve the primitives' order three times.
-    fn by_order(&mut self, numbers: &[u32]) -> Word {
+    fn by_order(&mut self, numbers: Vec<u32>) -> Word {
         let triangles = numbers.iter().filter(|&&n| self.primitives.is_triangle(n)).count();
         if triangles == numbers.len() && triangles <= 8 || triangles == 0 && numbers.len() <= MAX_RUN {
-            return self.leaves.add(numbers, self.primitives);
+            return self.leaves.add(&numbers, self.primitives);
         }
         let (first, second): (Vec<u32>, Vec<u32>) =
             numbers.iter().partition(|&&n| self.primitives.is_triangle(n));
@@ -169,7 +170,7 @@ impl Collapse<'_> {
         let size = numbers.len().div_ceil(7).max(MAX_RUN);
         for (lane, part) in first.chunks(size).chain(second.chunks(size)).enumerate() {
             let bounds = part.iter().fold(Bounds::EMPTY, |b, &n| b.union(self.bounds[n as usize]));
-            let word = self.by_order(part);
+            let word = self.by_order(part.to_vec());
             self.nodes[index].set(lane, bounds, word);
         }
         Word::node(index)

@@ -46,7 +46,19 @@ impl Bvh {
         ray: &Ray,
         others: impl FnMut(Run, &mut Nearest),
     ) -> Nearest {
-        dispatch(Closest { bvh: self, leaves, ray, others })
+        self.closest_before(leaves, ray, Nearest::NONE, others)
+    }
+
+    /// Finds a hit nearer than `nearest`.
+    #[inline]
+    pub(super) fn closest_before(
+        &self,
+        leaves: &Leaves,
+        ray: &Ray,
+        nearest: Nearest,
+        others: impl FnMut(Run, &mut Nearest),
+    ) -> Nearest {
+        dispatch(Closest { bvh: self, leaves, ray, nearest, others })
     }
 
     /// True if anything is hit before `t_max`.
@@ -144,6 +156,7 @@ struct Closest<'a, F> {
     bvh: &'a Bvh,
     leaves: &'a Leaves,
     ray: &'a Ray,
+    nearest: Nearest,
     others: F,
 }
 
@@ -152,7 +165,7 @@ impl<F: FnMut(Run, &mut Nearest)> Kernel for Closest<'_, F> {
 
     #[inline(always)]
     fn run<L: Lanes>(mut self, lanes: L) -> Nearest {
-        let mut nearest = Nearest::NONE;
+        let mut nearest = self.nearest;
         let Some(mut word) = self.bvh.root else { return nearest };
         let slabs = Slabs::new(lanes, self.ray, &self.bvh.bounds);
         let sheared = ShearedRay::new(self.ray);
@@ -269,9 +282,9 @@ mod tests {
             let first = mesh.positions.len() as u32;
             mesh.positions.extend((0..3).map(|k| {
                 let p = at + uniform_sphere(SamplePoint::new(k, i).get_2d(0)) * size;
-                if i % 7 == 0 { p.with_y(at.y) } else { p }
+                if i.is_multiple_of(7) { p.with_y(at.y) } else { p }
             }));
-            mesh.triangles.push([first, first + 1, first + if i % 11 == 0 { 1 } else { 2 }]);
+            mesh.triangles.push([first, first + 1, first + if i.is_multiple_of(11) { 1 } else { 2 }]);
         }
         let sources = (0..count).map(|index| Source::Triangle { mesh: 0, index }).collect();
         Primitives { sources, meshes: vec![Mesh::new(&mesh)] }
@@ -294,7 +307,13 @@ mod tests {
                 _ => Vec3::AXES[i as usize / 3 % 3],
             };
             let ray = &Ray::new(origin, direction);
-            let closest = || Closest { bvh: &bvh, leaves: &leaves, ray, others: |_, _: &mut Nearest| {} };
+            let closest = || Closest {
+                bvh: &bvh,
+                leaves: &leaves,
+                ray,
+                nearest: Nearest::NONE,
+                others: |_, _: &mut Nearest| {},
+            };
             let (wide, plain) = (dispatch(closest()), closest().run(Portable));
             assert_eq!((wide.t.to_bits(), wide.primitive), (plain.t.to_bits(), plain.primitive), "{i}");
             let any = || Any { bvh: &bvh, leaves: &leaves, ray, t_max: 0.3, others: |_| false };

@@ -51,8 +51,8 @@ impl Compiler<'_> {
             return None;
         }
         let focus_distance = camera.focus_distance.unwrap_or(to_target) as f32;
-        let lens =
-            (camera.aperture > 0.0).then(|| Lens { radius: (0.5 * camera.aperture) as f32, focus_distance });
+        let lens = (camera.aperture > 0.0)
+            .then_some(Lens { radius: (0.5 * camera.aperture) as f32, focus_distance });
         Some(Projection::Perspective { tan_half_fov, lens })
     }
 }

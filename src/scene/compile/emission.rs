@@ -1,9 +1,12 @@
 //! Objects with an emission: they become lights, and their surface tells which.
 
-use super::super::file::{ObjectFile, PolygonFile, ShapeFile};
+use super::super::file::ObjectFile;
 use super::super::issue::IssueCode;
-use super::super::{Light, LightId, MeshLight, ObjectId, SphereLight};
+use super::super::shape_file::{PolygonFile, ShapeFile};
+use super::super::{DiskLight, Light, LightId, MeshLight, ObjectId, SphereLight};
+use super::shape::sides;
 use super::{Compiler, vec3};
+use crate::geometry::MeshData;
 use crate::light_path::Bounce;
 use glam::{DVec2, DVec3, Vec3};
 
@@ -21,22 +24,44 @@ impl Compiler<'_> {
         if self.issues.count() > 0 {
             return;
         }
-        let light = match &object.shape {
+        let Some(light) = self.emitter(&object.shape, radiance, index) else { return };
+        self.objects[id.index()].emitter = Some(LightId(self.lights.len() as u32));
+        self.lights.push(light);
+    }
+
+    /// The light of a shape; `None` where there is none of that shape, which has then been noted.
+    fn emitter(&mut self, shape: &ShapeFile, radiance: Vec3, index: usize) -> Option<Light> {
+        let of_mesh = |mesh: &MeshData| {
+            let corners = mesh.triangles.iter().map(|t| t.map(|v| mesh.positions[v as usize]));
+            Light::Mesh(MeshLight::new(radiance, corners))
+        };
+        Some(match shape {
             ShapeFile::Sphere(sphere) => Light::Sphere(SphereLight {
                 center: vec3(sphere.center),
                 radius: sphere.radius as f32,
                 radiance,
             }),
+            ShapeFile::Disk(disk) => Light::Disk(DiskLight {
+                center: vec3(disk.center),
+                radius: disk.radius as f32,
+                normal: DVec3::from(disk.normal).normalize().as_vec3(),
+                radiance,
+            }),
             ShapeFile::Polygon(polygon) => Light::Mesh(MeshLight::new(radiance, triangles(polygon))),
-            ShapeFile::Mesh(mesh) => {
-                let pointer = format!("/objects/{index}");
-                let Some(mesh) = self.meshes.load(mesh, &pointer, self.issues) else { return };
-                let corners = mesh.triangles.iter().map(|t| t.map(|v| mesh.positions[v as usize]));
+            ShapeFile::Box(file) => {
+                let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
+                let corners = sides(file).into_iter().flat_map(halves).map(|t| t.map(|p| p.as_vec3()));
                 Light::Mesh(MeshLight::new(radiance, corners))
             }
-        };
-        self.objects[id.index()].emitter = Some(LightId(self.lights.len() as u32));
-        self.lights.push(light);
+            ShapeFile::Mesh(_) | ShapeFile::Heightfield(_) => {
+                of_mesh(&self.mesh_of(shape, &format!("/objects/{index}"))?)
+            }
+            ShapeFile::Cylinder(_) | ShapeFile::Instance(_) => {
+                let message = "cylinders and instances cannot emit yet: use a mesh";
+                self.issues.add(format!("/objects/{index}/emission"), IssueCode::ConflictingFields, message);
+                return None;
+            }
+        })
     }
 }
 

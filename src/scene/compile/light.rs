@@ -1,7 +1,7 @@
 //! Lights of the scene file; those that have an area also become surfaces that are seen.
 
-use super::super::file::{DirectionalLightFile, LightFile, QuadLightFile, SpotLightFile};
 use super::super::issue::IssueCode;
+use super::super::light_file::{DirectionalLightFile, LightFile, QuadLightFile, SpotLightFile};
 use super::super::{
     DiskLight, Light, LightId, Material, MaterialId, Object, QuadLight, SphereLight, SpotLight, Texture,
 };
@@ -13,8 +13,6 @@ const MIN_EDGE_SINE: f64 = 1e-5;
 
 /// Least angle of a spot's cone, degrees: below it floats no longer tell its cosine from 1.
 const MIN_CONE: f64 = 0.1;
-/// Corners of the outline that stands for a disk light where it is seen or in the way.
-const DISK_CORNERS: u32 = 64;
 
 impl Compiler<'_> {
     pub(super) fn lights(&mut self, lights: &[Option<LightFile>]) {
@@ -57,15 +55,16 @@ impl Compiler<'_> {
         let material = self.black();
         let emitter = Some(LightId(self.lights.len() as u32));
         let object = self.add_object(Object { name: format!("lights/{index}"), material, emitter });
-        let (outline, field) = match light {
-            Light::Quad(quad) => (quad.corners().to_vec(), "size"),
-            Light::Disk(disk) => (rim(disk), "radius"),
-            Light::Sphere(sphere) => return self.geometry.sphere(object, sphere.center, sphere.radius),
-            Light::Point { .. } | Light::Spot(_) | Light::Directional { .. } | Light::Mesh(_) => return,
-        };
-        if let Err(error) = self.geometry.polygon(object, &[outline]) {
-            let message = format!("too small for its distance from the origin: {error}");
-            self.issues.add(format!("/lights/{index}/{field}"), IssueCode::Degenerate, message);
+        match light {
+            Light::Quad(quad) => {
+                if let Err(error) = self.geometry.polygon(object, &[quad.corners().to_vec()]) {
+                    let message = format!("too small for its distance from the origin: {error}");
+                    self.issues.add(format!("/lights/{index}/size"), IssueCode::Degenerate, message);
+                }
+            }
+            Light::Disk(disk) => self.geometry.disk(object, disk.center, disk.normal, disk.radius),
+            Light::Sphere(sphere) => self.geometry.sphere(object, sphere.center, sphere.radius),
+            Light::Point { .. } | Light::Spot(_) | Light::Directional { .. } | Light::Mesh(_) => {}
         }
     }
 
@@ -148,14 +147,4 @@ impl Compiler<'_> {
             radiance: vec3(quad.radiance),
         })
     }
-}
-
-/// Outline of a disk, anticlockwise seen from its lit side.
-fn rim(disk: &DiskLight) -> Vec<Vec3> {
-    let (x, y) = disk.normal.as_dvec3().any_orthonormal_pair();
-    let corner = |i: u32| {
-        let (sin, cos) = libm::sincos(std::f64::consts::TAU * f64::from(i) / f64::from(DISK_CORNERS));
-        disk.center.as_dvec3() + (x * cos + y * sin) * f64::from(disk.radius)
-    };
-    (0..DISK_CORNERS).map(|i| corner(i).as_vec3()).collect()
 }

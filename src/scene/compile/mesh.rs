@@ -1,10 +1,10 @@
 //! Meshes of the scene file, inline or from assets, checked and made ready for rendering.
 
 use super::super::assets::AssetSource;
-use super::super::file::MeshFile;
 use super::super::issue::{IssueCode, Issues};
 use super::super::mesh_file;
 use super::super::read::{MAX_LENGTH, MIN_LENGTH, quoted};
+use super::super::shape_file::MeshFile;
 use super::vec3;
 use crate::geometry::MeshData;
 use glam::{DVec3, Vec2, Vec3};

@@ -7,19 +7,20 @@ mod light;
 mod material;
 mod mesh;
 mod polygon;
+mod shape;
 
 use super::assets::AssetSource;
-use super::file::{
-    ImageFile, MaterialFile, ObjectFile, RenderFile, SceneFile, ShapeFile, StopFile, read_scene_file,
-};
+use super::file::{ImageFile, MaterialFile, ObjectFile, RenderFile, SceneFile, StopFile, read_scene_file};
 use super::issue::{IssueCode, Issues, SceneErrors};
 use super::json::{ParseError, ParseErrorKind, parse};
+use super::shape_file::ShapeFile;
 use super::{
     ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Tone,
 };
 use crate::geometry::GeometryBuilder;
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use mesh::MeshLoader;
+use shape::Originals;
 use std::collections::HashMap;
 
 impl Scene {
@@ -55,6 +56,7 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
     let mut compiler = Compiler {
         issues,
         meshes: MeshLoader::new(assets),
+        originals: Originals::new(file.objects.as_deref().unwrap_or_default()),
         material_ids: HashMap::new(),
         materials: Vec::new(),
         objects: Vec::new(),
@@ -87,6 +89,7 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
 struct Compiler<'f> {
     issues: &'f mut Issues,
     meshes: MeshLoader<'f>,
+    originals: Originals<'f>,
     material_ids: HashMap<&'f str, MaterialId>,
     materials: Vec<Material>,
     objects: Vec<Object>,
@@ -113,12 +116,11 @@ impl<'f> Compiler<'f> {
     fn objects(&mut self, objects: &[Option<ObjectFile>]) {
         for (index, object) in objects.iter().enumerate() {
             let Some(object) = object else { continue };
-            let pointer = format!("/objects/{index}");
             // The reader has refused names that no material has; those whose material is wrong remain.
             let material = self.material_ids.get(object.material.as_str()).copied().unwrap_or(MaterialId(0));
             let name = object.name.clone().unwrap_or_else(|| format!("objects/{index}"));
             let id = self.add_object(Object { name, material, emitter: None });
-            self.shape(id, &object.shape, &pointer);
+            self.shape(id, &object.shape, index);
             self.emission(id, object, index);
         }
     }
@@ -129,7 +131,8 @@ impl<'f> Compiler<'f> {
         id
     }
 
-    fn shape(&mut self, object: ObjectId, shape: &ShapeFile, pointer: &str) {
+    fn shape(&mut self, object: ObjectId, shape: &ShapeFile, index: usize) {
+        let pointer = &format!("/objects/{index}");
         match shape {
             ShapeFile::Sphere(sphere) => {
                 self.geometry.sphere(object, vec3(sphere.center), sphere.radius as f32)
@@ -137,11 +140,22 @@ impl<'f> Compiler<'f> {
             ShapeFile::Polygon(polygon) => {
                 polygon::add(polygon, object, &mut self.geometry, pointer, self.issues);
             }
-            ShapeFile::Mesh(mesh) => {
-                if let Some(mesh) = self.meshes.load(mesh, pointer, self.issues) {
-                    self.geometry.mesh(object, &mesh);
-                }
+            ShapeFile::Mesh(_) | ShapeFile::Heightfield(_) => self.add_mesh(shape, index, object),
+            ShapeFile::Disk(disk) => {
+                let normal = DVec3::from(disk.normal).normalize().as_vec3();
+                self.geometry.disk(object, vec3(disk.center), normal, disk.radius as f32);
             }
+            ShapeFile::Cylinder(file) => {
+                let (from, to) = (vec3(file.from), vec3(file.to));
+                if from == to {
+                    let message = "the ends of the cylinder are the same point";
+                    self.issues.add(format!("{pointer}/to"), IssueCode::Degenerate, message);
+                    return;
+                }
+                self.geometry.cylinder(object, from, to, file.radius as f32);
+            }
+            ShapeFile::Box(file) => self.box_sides(file, object, DAffine3::IDENTITY, pointer),
+            ShapeFile::Instance(instance) => self.instance(instance, object, pointer),
         }
     }
 

@@ -2,8 +2,8 @@
 //! knows what it can intersect; here its answer becomes an issue with a pointer.
 
 use super::super::ObjectId;
-use super::super::file::PolygonFile;
 use super::super::issue::{IssueCode, Issues};
+use super::super::shape_file::PolygonFile;
 use super::vec3;
 use crate::geometry::{GeometryBuilder, PolygonError};
 use glam::{DVec3, Vec3};

@@ -9,7 +9,7 @@ mod numbers;
 mod structure;
 
 pub(super) use numbers::{
-    MAX_LENGTH, MIN_LENGTH, color, count, direction, pair, point, real, seed, size2, uv,
+    MAX_LENGTH, MIN_LENGTH, color, count, direction, pair, point, real, scale, scale3, seed, size2, size3, uv,
 };
 pub(super) use structure::{
     choice, list, name, named, object, optional, or, part, reference, required, slots, triangle,

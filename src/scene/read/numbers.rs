@@ -225,6 +225,21 @@ pub(in crate::scene) fn size2() -> Tuple<2, Real> {
     Tuple::new("a size [width, height]", real("length").positive_length())
 }
 
+/// The three sides of a box.
+pub(in crate::scene) fn size3() -> Tuple<3, Real> {
+    Tuple::new("a size [x, y, z]", real("length").positive_length())
+}
+
+/// A factor by which something is scaled.
+pub(in crate::scene) fn scale() -> Real {
+    real("scale").between(1e-6, 1e6)
+}
+
+/// A factor for each axis.
+pub(in crate::scene) fn scale3() -> Tuple<3, Real> {
+    Tuple::new("a scale or scales [x, y, z]", scale())
+}
+
 /// A vector that points somewhere; it need not have length 1.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct Direction;

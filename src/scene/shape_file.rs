@@ -1,0 +1,141 @@
+//! The shapes of the scene file: exactly what the JSON says, nothing computed.
+
+use super::json::{Node, Value};
+use super::read::{
+    Context, Decode, direction, list, name, object, optional, or, point, real, record, required, scale,
+    scale3, size2, size3, tagged, triangle, uv,
+};
+
+tagged! {
+    /// A shape.
+    ShapeFile {
+        "sphere" => Sphere(SphereFile),
+        "polygon" => Polygon(PolygonFile),
+        "mesh" => Mesh(MeshFile),
+        "disk" => Disk(DiskFile),
+        "cylinder" => Cylinder(CylinderFile),
+        "box" => Box(BoxFile),
+        "heightfield" => Heightfield(HeightfieldFile),
+        "instance" => Instance(InstanceFile),
+    }
+}
+
+record! {
+    /// A flat disk.
+    DiskFile {
+        /// Centre.
+        center: [f64; 3] = required(point()),
+        /// Direction of its front.
+        normal: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
+        /// Radius.
+        radius: f64 = required(real("radius in metres").positive_length()),
+    }
+}
+
+record! {
+    /// A cylinder without its ends.
+    CylinderFile {
+        /// Middle of one end.
+        from: [f64; 3] = required(point()),
+        /// Middle of the other end.
+        to: [f64; 3] = required(point()),
+        /// Radius.
+        radius: f64 = required(real("radius in metres").positive_length()),
+    }
+}
+
+record! {
+    /// A box along the axes.
+    BoxFile {
+        /// Centre.
+        center: [f64; 3] = required(point()),
+        /// Its three sides.
+        size: [f64; 3] = required(size3()),
+    }
+}
+
+record! {
+    /// A surface of heights over a rectangle.
+    HeightfieldFile {
+        /// Centre of the rectangle.
+        center: [f64; 3] = or(point(), [0.0; 3]),
+        /// Its extent along x and z.
+        size: [f64; 2] = required(size2()),
+        /// Rows from low to high z, each from low to high x: heights above the centre.
+        heights: Vec<Vec<f64>> = required(list(2, list(2, real("height in metres")))),
+    }
+}
+
+record! {
+    /// Another object in another place. It is scaled, then turned, then moved.
+    InstanceFile {
+        /// Name of the object.
+        of: String = required(name()),
+        /// By how much it is moved.
+        translate: [f64; 3] = or(point(), [0.0; 3]),
+        /// By how much it is turned.
+        rotate: Option<RotateFile> = optional(object::<RotateFile>()),
+        /// By how much it is scaled, in all or along each of the axes.
+        scale: [f64; 3] = or(Scale, [1.0; 3]),
+    }
+}
+
+record! {
+    /// A rotation about an axis through the origin.
+    RotateFile {
+        /// The axis.
+        axis: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
+        /// Degrees, anticlockwise seen against the axis.
+        angle: f64 = required(real("angle in degrees").between(-3600.0, 3600.0)),
+    }
+}
+
+record! {
+    /// A sphere.
+    SphereFile {
+        /// Centre.
+        center: [f64; 3] = required(point()),
+        /// Radius.
+        radius: f64 = required(real("radius in metres").positive_length()),
+    }
+}
+
+record! {
+    /// A planar polygon, convex or not.
+    PolygonFile {
+        /// The outline, anticlockwise seen from the front.
+        vertices: Vec<[f64; 3]> = required(list(3, point())),
+        /// Outlines of holes, in either order.
+        holes: Vec<Vec<[f64; 3]>> = or(list(0, list(3, point())), Vec::new()),
+    }
+}
+
+record! {
+    /// A triangle mesh, here or in a file of its own.
+    MeshFile {
+        /// A PLY or OBJ file.
+        asset: Option<String> = optional(name()),
+        /// Positions of the vertices.
+        positions: Option<Vec<[f64; 3]>> = optional(list(3, point())),
+        /// Three indices of vertices per triangle.
+        triangles: Option<Vec<[u32; 3]>> = optional(list(1, triangle())),
+        /// A normal per vertex.
+        normals: Option<Vec<[f64; 3]>> = optional(list(3, direction())),
+        /// Texture coordinates per vertex.
+        uvs: Option<Vec<[f64; 2]>> = optional(list(3, uv())),
+    }
+}
+
+/// One scale, or one for each axis.
+struct Scale;
+
+impl Decode for Scale {
+    type Out = [f64; 3];
+
+    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<[f64; 3]> {
+        match node.value {
+            Value::Array(_) => scale3().decode(node, cx),
+            _ => scale().decode(node, cx).map(|s| [s; 3]),
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The picture: layers, footprints, smoothing, and the estimate of its error.
+
+use crate::support::{SEEDS, camera_above, compile, floor, render, scene};
+use glam::{DVec3, Vec3};
+use nephroid::geometry::Ray;
+use nephroid::image_io::LinearImage;
+use nephroid::light_path::PathClass;
+use nephroid::pass2_eye::Footprints;
+use nephroid::photon_map::{Photon, PhotonMap};
+use nephroid::sampling::SamplePoint;
+use serde_json::{Value, json};
+
+/// The floor lit by the image of a point light in a mirror at x = 1, seen from above: 40 cm around x = 0.5.
+fn mirrored_light(width: f64, pixels: u32) -> Value {
+    let mirror = json!({ "type": "polygon", "material": "mirror",
+                         "vertices": [[1, 0, -1], [1, 0, 1], [1, 1, 1], [1, 1, -1]] });
+    let lights = json!([{ "type": "point", "position": [0, 1, 0], "intensity": [1, 1, 1] }]);
+    let mut value =
+        scene(camera_above([0.5, 0.0, 0.0], 3.0, width), json!([floor(2.0, 0.0), mirror]), lights);
+    value["image"] = json!({ "width": pixels, "height": pixels });
+    value
+}
+
+/// What [`mirrored_light`]'s caustic layer is at a floor point: radiance of a floor of albedo 1/2.
+fn mirrored_radiance(x: f64, z: f64) -> f64 {
+    let to = DVec3::new(2.0 - x, 1.0, -z);
+    0.9 * to.y / to.length().powi(3) * 0.5 / std::f64::consts::PI
+}
+
+/// Largest relative difference of two pictures' pixels where the second is not dark.
+fn relative_errors(image: &LinearImage, truth: impl Fn(usize) -> f64) -> f64 {
+    let squares = image.pixels.iter().enumerate().map(|(i, p)| (f64::from(p[1]) / truth(i) - 1.0).powi(2));
+    (squares.sum::<f64>() / image.pixels.len() as f64).sqrt()
+}
+
+/// The true caustic radiance at a pixel's middle.
+fn truth(width: f64, pixels: usize) -> impl Fn(usize) -> f64 {
+    let at = move |k: usize| ((k as f64 + 0.5) / pixels as f64 - 0.5) * width;
+    move |i| mirrored_radiance(0.5 + at(i % pixels), at(i / pixels))
+}
+
+#[test]
+fn the_layers_add_up_to_the_image() {
+    let objects = json!([
+        floor(2.0, 0.0),
+        { "type": "sphere", "material": "glass", "center": [0, 0.6, 0], "radius": 0.5 },
+    ]);
+    let lights = json!([{ "type": "quad", "center": [0, 3, 1], "size": [0.4, 0.3], "towards": [0, 0, 0],
+                          "radiance": [20, 18, 15] }]);
+    let mut value = scene(camera_above([0.3, 0.0, 0.0], 3.0, 3.0), objects, lights);
+    value["environment"] = json!({ "radiance": [0.1, 0.2, 0.3] });
+    let render = render(&value, 1, 3, 10);
+    let layers = PathClass::ALL.map(|class| render.layer(class));
+    for (i, pixel) in render.image().pixels.iter().enumerate() {
+        let sum = layers.iter().map(|layer| Vec3::from_array(layer.pixels[i])).sum::<Vec3>();
+        // Rounding of three additions.
+        assert!((sum - Vec3::from_array(*pixel)).abs().max_element() <= 1e-6 * sum.max_element(), "{i}");
+    }
+}
+
+/// Every photon on the floor falls on exactly one pixel's footprint.
+#[test]
+fn footprints_count_every_photon_once() {
+    let width = 0.4;
+    let scene = compile(&mirrored_light(width, 24));
+    let footprints = Footprints::trace(&scene);
+    let sheet = scene.geometry.closest_hit(&Ray::new(Vec3::new(0.5, 1.0, 0.0), Vec3::NEG_Y)).unwrap().sheet;
+    let half = 0.5 * width as f32 * 0.999;
+    let photons: Vec<Photon> = (0..20_000)
+        .map(|i| {
+            let u = SamplePoint::new(6, i).get_2d(0) * 2.0 - 1.0;
+            let position = Vec3::new(0.5 + half * u.x, 0.0, half * u.y);
+            let direction = Vec3::new(-0.6, -0.8, 0.0);
+            Photon { position, direction, normal: Vec3::Y, sheet, power: Vec3::ONE }
+        })
+        .collect();
+    let map = PhotonMap::build(&photons);
+    let (count, _) = footprints.size();
+    let total: f32 = (0..count).map(|i| map.flux_within(footprints.get(i).unwrap()).y).sum();
+    // On a shared edge the two sides' rounding may disagree; 24² edges of 20,000 photons meet next to none.
+    assert!((total - photons.len() as f32).abs() <= 3.0, "{total}");
+    let area: f32 = (0..count).map(|i| footprints.get(i).unwrap().area).sum();
+    assert!((area / (width * width) as f32 - 1.0).abs() < 1e-4, "{area}");
+}
+
+/// Where a caustic is smooth the two halves advise to smooth it: noise falls to less than a third.
+#[test]
+fn smooth_light_is_smoothed() {
+    let (width, pixels) = (0.4, 64);
+    let render = render(&mirrored_light(width, pixels), 1, 1, 16);
+    let picture = render.layer(PathClass::Caustic);
+    let unsmoothed = render.raw_layer(PathClass::Caustic);
+    let truth = truth(width, pixels as usize);
+    let (after, before) = (relative_errors(&picture, &truth), relative_errors(&unsmoothed, &truth));
+    assert!(after < before / 3.0, "{after} {before}");
+}
+
+/// The mirror's outline projects to a sharp edge, z = 2 - x: three pixels from it the light is whole on one side
+/// and nothing on the other.
+#[test]
+fn sharp_light_stays_sharp() {
+    let (width, pixels) = (0.4, 64_usize);
+    let mut value = mirrored_light(width, pixels as u32);
+    value["camera"] = camera_above([0.5, 0.0, 1.5], 3.0, width);
+    let picture = render(&value, 1, 1, 19).layer(PathClass::Caustic);
+    let at = |k: usize| ((k as f64 + 0.5) / pixels as f64 - 0.5) * width;
+    let pixel = width / pixels as f64;
+    let (mut inside, mut outside) = (Vec::new(), Vec::new());
+    for (i, value) in picture.pixels.iter().enumerate() {
+        let (x, z) = (0.5 + at(i % pixels), 1.5 + at(i / pixels));
+        // Distance from the edge, whose slope is one.
+        let within = (2.0 - x - z) / 2.0_f64.sqrt();
+        let relative = f64::from(value[1]) / mirrored_radiance(x, z);
+        if (3.0 * pixel..6.0 * pixel).contains(&within) {
+            inside.push(relative);
+        } else if (3.0 * pixel..6.0 * pixel).contains(&-within) {
+            outside.push(relative);
+        }
+    }
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    assert!((mean(&inside) - 1.0).abs() < 0.03, "{}", mean(&inside));
+    assert!(mean(&outside) < 0.03, "{}", mean(&outside));
+}
+
+/// The estimate of the error, which knows no truth, against the error itself: right to a factor 1.5 in the
+/// mean over seeds (choosing the least of noisy estimates makes it optimistic, large windows pessimistic).
+#[test]
+fn the_estimated_error_is_the_true_one_to_a_factor() {
+    let (width, pixels) = (0.4, 48);
+    let mut value = mirrored_light(width, pixels);
+    // Only the mirror's light: the lamp itself is hidden from the floor that is seen.
+    let lid = json!({ "name": "lid", "type": "polygon", "material": "floor",
+                      "vertices": [[0.1, 0.4, 0.5], [0.45, 0.4, 0.5], [0.45, 0.4, -0.5], [0.1, 0.4, -0.5]] });
+    value["objects"].as_array_mut().unwrap().push(lid);
+    let width = 0.1;
+    value["camera"] = camera_above([0.6, 0.0, 0.0], 0.3, width);
+    let (mut estimated, mut actual) = (0.0, 0.0);
+    for seed in 1..=SEEDS {
+        let render = render(&value, seed, 1, 15);
+        assert_eq!(crate::support::mean(&render.layer(PathClass::Direct)), 0.0, "the lid hides the lamp");
+        let at = |k: usize| ((k as f64 + 0.5) / f64::from(pixels) - 0.5) * width;
+        let truth = |i: usize| mirrored_radiance(0.6 + at(i % pixels as usize), at(i / pixels as usize));
+        actual += relative_errors(&render.image(), truth).powi(2);
+        // The estimate is relative to L² + (L/10)².
+        estimated += f64::from(render.error_estimate().unwrap()).powi(2) * 1.01;
+    }
+    let ratio = (estimated / actual).sqrt();
+    assert!((1.0 / 1.5..1.5).contains(&ratio), "estimated over true: {ratio}");
+}
