@@ -124,13 +124,13 @@ mod tests {
     /// A window of which only one corner delivers, unevenly.
     fn guide() -> Guide {
         let mut lesson = Lesson::new();
-        for i in 0..8192 {
+        for i in 0..16_384 {
             let at = SamplePoint::new(1, i).get_2d(0);
             if at.x < 0.3 && at.y < 0.4 {
                 lesson.delivered(at, 1.0 + at.x * 5.0);
             }
         }
-        lesson.learn().expect("a tenth delivers: far more than the least gain")
+        lesson.learn().expect("an eighth delivers: far more than the least gain")
     }
 
     /// The mean of 1/density over warped points is the area of the square: the density is a density. The

@@ -1,6 +1,7 @@
 //! Pass 2, `LD`: light that reaches a D straight from the lights, by shadow rays.
 
 use crate::geometry::{Ray, SurfacePoint, offset_origin};
+use crate::optics::transmittance;
 use crate::sampling::{SamplePoint, cosine_hemisphere};
 use crate::scene::{Light, Scene, SpotLight};
 use glam::Vec3;
@@ -18,6 +19,8 @@ pub(super) struct Receiver<'a> {
     pub(super) surface: &'a SurfacePoint,
     /// Normal on the side that is seen.
     pub(super) normal: Vec3,
+    /// Absorption coefficient of the medium on that side.
+    pub(super) absorption: Vec3,
 }
 
 /// A direction from which light may come.
@@ -79,7 +82,8 @@ fn visible(scene: &Scene, receiver: &Receiver<'_>, incident: Option<Incident>, r
     if scene.geometry.any_hit(&Ray::new(origin, incident.direction), incident.distance) {
         return Vec3::ZERO;
     }
-    incident.irradiance
+    // Nothing was met on the way, so that the light is in the same medium.
+    incident.irradiance * transmittance(receiver.absorption, incident.distance)
 }
 
 fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Option<Incident> {

@@ -230,7 +230,7 @@ impl<'a> EyeWalk<'a> {
         // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
         let weight = branch.throughput * albedo / std::f32::consts::PI;
         let normal = if backside { -hit.surface.normal } else { hit.surface.normal };
-        let receiver = Receiver { surface: &hit.surface, normal };
+        let receiver = Receiver { surface: &hit.surface, normal, absorption: branch.absorption };
         let sample = self.sample.branch(branch.key);
         let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
         sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);

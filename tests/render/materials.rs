@@ -155,6 +155,18 @@ fn t14_an_absorbing_pool_dims_both_ways() {
     estimate.assert_is((-1.0_f64).exp(), 1e-3);
 }
 
+/// A lamp under that water, at height 1/2, lights the floor through half a metre of it; the eye loses a metre's.
+#[test]
+fn t14_a_lamp_under_water_is_dimmed_on_its_way_to_the_floor() {
+    let water = json!({ "type": "polygon", "material": "slab", "vertices": [[-2, 1, 2], [2, 1, 2], [2, 1, -2], [-2, 1, -2]] });
+    let lamp = json!([{ "type": "point", "position": [0, 0.5, 0], "intensity": [1, 1, 1] }]);
+    let mut value = scene(camera_above([0.0; 3], 50.0, 0.01), json!([floor(2.0, 0.0), water]), lamp);
+    value["materials"]["slab"] = json!({ "type": "glass", "ior": 1, "absorption": [0.8, 0.8, 0.8] });
+    let irradiance = mean_irradiance(&render(&value, 1, 2, 8), PathClass::Direct);
+    let expected = 4.0 * (-0.8_f64 * 1.5).exp();
+    assert!((irradiance / expected - 1.0).abs() < 1e-3, "{irradiance}, expected {expected}");
+}
+
 /// T15: a ray through a slab of thickness 1 and n = 1.5 at 45° is shifted by sin θ (1 - cos θ / √(n² - sin² θ)).
 /// The renderer's directions are floats: eight ulps.
 #[test]
