@@ -1,6 +1,7 @@
-//! S: what a mirror or smooth glass does to a ray, in either direction of travel.
+//! S: what mirrors, smooth metal and glass do to a ray, in either direction of travel.
 
 use crate::geometry::SurfacePoint;
+use crate::scene::{Conductor, Material};
 use glam::Vec3;
 
 /// Which way a ray leaves a specular surface.
@@ -85,6 +86,99 @@ pub fn fresnel(cos_i: f32, eta: f32) -> f32 {
     let s = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     let p = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
     0.5 * (s * s + p * p)
+}
+
+/// Unpolarised Fresnel reflectance of a conductor of complex index `n` + i`k` in air, one channel.
+#[must_use]
+pub fn fresnel_conductor(cos_i: f32, n: f32, k: f32) -> f32 {
+    if cos_i <= 0.0 {
+        return 1.0;
+    }
+    let cos2 = cos_i.min(1.0) * cos_i.min(1.0);
+    let sin2 = 1.0 - cos2;
+    let (n2, k2) = (n * n, k * k);
+    let t = n2 - k2 - sin2;
+    // (a + ib)² = (n + ik)² - sin².
+    let length = (t * t + 4.0 * n2 * k2).sqrt();
+    let a = (0.5 * (length + t)).max(0.0).sqrt();
+    let cross = 2.0 * a * cos_i.min(1.0);
+    let s = (length + cos2 - cross) / (length + cos2 + cross);
+    let (sum, mixed) = (cos2 * length + sin2 * sin2, cross * sin2);
+    let p = s * (sum - mixed) / (sum + mixed);
+    0.5 * (s + p)
+}
+
+/// Reflectance of a metal per channel.
+#[must_use]
+pub fn metal_reflectance(cos_i: f32, conductor: &Conductor) -> Vec3 {
+    match conductor {
+        Conductor::Normal(f0) => {
+            let m = 1.0 - cos_i.clamp(0.0, 1.0);
+            *f0 + (Vec3::ONE - *f0) * (m * m * m * m * m)
+        }
+        Conductor::Complex { n, k } => {
+            let channel = |i: usize| fresnel_conductor(cos_i, n[i], k[i]);
+            Vec3::new(channel(0), channel(1), channel(2))
+        }
+    }
+}
+
+/// What a surface does to a ray if it is an S, `None` if it is a D.
+#[must_use]
+pub fn interact(material: &Material, direction: Vec3, surface: &SurfacePoint) -> Option<Interaction> {
+    match material {
+        Material::Diffuse { .. } => None,
+        Material::Mirror { reflectance } => Some(mirror(direction, surface, *reflectance)),
+        Material::Metal(conductor) => {
+            let cos_i = -Frame::new(direction, surface).shading.dot(direction);
+            Some(mirror(direction, surface, metal_reflectance(cos_i, conductor)))
+        }
+        Material::Glass { ior, .. } => Some(glass(direction, surface, *ior)),
+    }
+}
+
+/// Absorption coefficient of what a ray has come through: of the surface's own glass if it arrives from within,
+/// else what was known of its way.
+#[inline]
+#[must_use]
+pub fn absorption_before(material: &Material, direction: Vec3, surface: &SurfacePoint, known: Vec3) -> Vec3 {
+    match material {
+        Material::Glass { absorption, .. } if direction.dot(surface.normal) > 0.0 => *absorption,
+        Material::Glass { .. } | Material::Diffuse { .. } | Material::Mirror { .. } | Material::Metal(_) => {
+            known
+        }
+    }
+}
+
+/// Absorption coefficient of what a ray goes on through; `before` is that of what it came through.
+#[inline]
+#[must_use]
+pub fn absorption_after(
+    material: &Material,
+    outcome: &Outcome,
+    surface: &SurfacePoint,
+    before: Vec3,
+) -> Vec3 {
+    match material {
+        Material::Glass { absorption, .. } if outcome.event == Event::Refraction => {
+            if outcome.direction.dot(surface.normal) < 0.0 { *absorption } else { Vec3::ZERO }
+        }
+        Material::Glass { .. } | Material::Diffuse { .. } | Material::Mirror { .. } | Material::Metal(_) => {
+            before
+        }
+    }
+}
+
+/// Share of the light that is left after a way through an absorbing medium (Beer and Lambert).
+#[inline]
+#[must_use]
+pub fn transmittance(absorption: Vec3, distance: f32) -> Vec3 {
+    if absorption == Vec3::ZERO {
+        return Vec3::ONE;
+    }
+    // A channel that is not absorbed is not over an infinite way either.
+    let left = |a: f32| if a > 0.0 { libm::expf(-a * distance) } else { 1.0 };
+    Vec3::new(left(absorption.x), left(absorption.y), left(absorption.z))
 }
 
 /// What a mirror does.

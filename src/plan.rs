@@ -8,7 +8,7 @@ use crate::pass2_eye::Footprints;
 use crate::photon_map;
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
-use crate::scene::{Light, Material, Paths, Scene};
+use crate::scene::{Light, LightSampling, Material, Paths, Scene};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -84,7 +84,15 @@ impl Plan {
         plan.decide_pass_1(scene);
         plan.decide_direct(scene);
         plan.decide_structure(scene);
-        plan.decide("lens", false, "pinhole", "the camera has no aperture: no lens samples");
+        match scene.camera.lens() {
+            Some(_) => plan.decide(
+                "lens",
+                true,
+                "one point of the lens per eye sample",
+                "the camera has an aperture",
+            ),
+            None => plan.decide("lens", false, "pinhole", "the camera has no aperture: no lens samples"),
+        }
         plan.decide("time", false, "one instant", "nothing moves: no time samples");
         plan.decide("colour", true, "RGB", "nothing disperses light: no wavelengths");
         plan.memory_bytes = plan.estimate_memory(scene);
@@ -193,7 +201,7 @@ impl Plan {
     }
 
     fn decide_direct(&mut self, scene: &Scene) {
-        let delta = |l: &Light| matches!(l, Light::Point { .. } | Light::Directional { .. });
+        let delta = |l: &Light| l.surface_radiance().is_none();
         let lit = scene.lights.iter().filter(|l| !l.is_dark()).count();
         let dark = scene.lights.len() - lit;
         if dark > 0 {
@@ -206,10 +214,15 @@ impl Plan {
         }
         let (choice, reason) = if scene.lights.iter().all(delta) {
             ("one shadow ray per light", "the lights have no size: nothing to sample")
+        } else if scene.render.light_sampling != LightSampling::Sobol {
+            (
+                "a grid of shadow rays per quad or disk light",
+                "`light_sampling` asks for it; the default, one Sobol point, is quicker for the same error",
+            )
         } else {
             (
                 "one shadow ray per light to a sampled point",
-                "area lights are sampled by solid angle, Owen-scrambled Sobol",
+                "quads and spheres are sampled by solid angle, other lights by area; Owen-scrambled Sobol",
             )
         };
         self.decide("direct light", true, choice, reason);
@@ -252,7 +265,7 @@ impl Plan {
 fn receives(material: &Material) -> bool {
     match material {
         Material::Diffuse { albedo } => !albedo.is_black(),
-        Material::Mirror { .. } | Material::Glass { .. } => false,
+        Material::Mirror { .. } | Material::Metal(_) | Material::Glass { .. } => false,
     }
 }
 
@@ -283,12 +296,7 @@ pub fn source_name(scene: &Scene, source: Source) -> String {
     match source {
         Source::Environment => "environment".to_owned(),
         Source::Light(id) => {
-            let kind = match &scene.lights[id.index()] {
-                Light::Point { .. } => "point",
-                Light::Directional { .. } => "directional",
-                Light::Quad(_) => "quad",
-            };
-            format!("{kind} light {}", id.0)
+            format!("{} light {}", scene.lights[id.index()].kind(), id.0)
         }
     }
 }

@@ -178,6 +178,17 @@ pub fn uniform_sphere(u: glam::Vec2) -> glam::Vec3 {
     glam::Vec3::new(r * libm::cosf(angle), r * libm::sinf(angle), z)
 }
 
+/// A direction uniform in the cone around the unit vector `axis` whose solid angle is 2π `height`; `height` is
+/// 1 - cos of the angle between axis and side.
+#[must_use]
+pub fn cone_direction(axis: glam::DVec3, height: f64, u: glam::Vec2) -> glam::DVec3 {
+    let below = f64::from(u.x) * height;
+    let r = (below * (2.0 - below)).max(0.0).sqrt();
+    let angle = std::f64::consts::TAU * f64::from(u.y);
+    let (x, y) = axis.any_orthonormal_pair();
+    (x * (r * libm::cos(angle)) + y * (r * libm::sin(angle)) + axis * (1.0 - below)).normalize()
+}
+
 /// A direction around `normal` with density cosθ / π.
 #[must_use]
 pub fn cosine_hemisphere(normal: glam::Vec3, u: glam::Vec2) -> glam::Vec3 {

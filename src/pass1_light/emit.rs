@@ -1,10 +1,10 @@
 //! Pass 1, `L`: draws a ray from a light through a window, and the flux it stands for.
 
 use super::window::{Region, Source, Window};
-use crate::geometry::Ray;
-use crate::sampling::{SamplePoint, concentric_disc, uniform_sphere};
-use crate::scene::{Light, ObjectId, QuadLight, Scene};
-use glam::{Vec2, Vec3};
+use crate::geometry::{Ray, offset_origin};
+use crate::sampling::{SamplePoint, concentric_disc, cone_direction, cosine_hemisphere, uniform_sphere};
+use crate::scene::{DiskLight, Light, LightPoint, ObjectId, QuadLight, Scene, SphereLight, SpotLight};
+use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// Draws photons for one window.
@@ -75,9 +75,20 @@ impl<'a> Emission<'a> {
                 let origin = Origin { point: *position, strength: *intensity, normal: None };
                 self.emit_from_point(&origin, through)
             }
+            Sampler::Light(Light::Spot(spot)) => self.emit_from_spot(spot, through),
             Sampler::Light(Light::Quad(quad)) => {
-                self.emit_from_point(&point_on_quad(quad, sample.get_2d(2)), through)
+                let point = point_on_quad(quad, sample.get_2d(2));
+                self.emit_from_point(&Origin::on(&point, quad.radiance * quad.area()), through)
             }
+            Sampler::Light(Light::Disk(disk)) => {
+                let point = point_on_disk(disk, sample.get_2d(2));
+                self.emit_from_point(&Origin::on(&point, disk.radiance * disk.area()), through)
+            }
+            Sampler::Light(Light::Mesh(mesh)) => {
+                let point = mesh.sample(sample.get_2d(2))?;
+                self.emit_from_point(&Origin::on(&point, mesh.radiance * mesh.area()), through)
+            }
+            Sampler::Light(Light::Sphere(sphere)) => self.emit_from_sphere(sphere, through, sample.get_2d(2)),
         }?;
         photon.power /= density;
         (photon.power.max_element() > 0.0).then_some(photon)
@@ -94,10 +105,10 @@ impl<'a> Emission<'a> {
                 (direction, u.cross(*v).dot(direction).abs() / distance2)
             }
             Region::AllDirections => match origin.normal {
+                // By the cosine: its density cosθ / π takes the place of the cosine below.
                 Some(normal) => {
-                    // Uniform over the hemisphere of the emitting side.
-                    let d = uniform_sphere(through);
-                    (if d.dot(normal) < 0.0 { -d } else { d }, 2.0 * PI)
+                    let ray = Ray::new(origin.point, cosine_hemisphere(normal, through));
+                    return Some(EmittedPhoton { ray, power: origin.strength * PI });
                 }
                 None => (uniform_sphere(through), 4.0 * PI),
             },
@@ -106,6 +117,57 @@ impl<'a> Emission<'a> {
         let cosine = origin.normal.map_or(1.0, |n| n.dot(direction).max(0.0));
         let ray = Ray::new(origin.point, direction);
         Some(EmittedPhoton { ray, power: origin.strength * (cosine * solid_angle) })
+    }
+
+    /// From a point through the window, or uniformly into the cone.
+    fn emit_from_spot(&self, spot: &SpotLight, through: Vec2) -> Option<EmittedPhoton> {
+        let mut photon = match &self.window.region {
+            Region::AllDirections => {
+                let height = 1.0 - f64::from(spot.cos_outer);
+                let direction = cone_direction(spot.axis.as_dvec3(), height, through).as_vec3();
+                let ray = Ray::new(spot.position, direction);
+                EmittedPhoton { ray, power: Vec3::splat(2.0 * PI * height as f32) }
+            }
+            Region::Rectangle { .. } | Region::Disc { .. } => {
+                let origin = Origin { point: spot.position, strength: Vec3::ONE, normal: None };
+                self.emit_from_point(&origin, through)?
+            }
+        };
+        photon.power *= spot.intensity_along(photon.ray.direction);
+        Some(photon)
+    }
+
+    /// Through a point of the window along a direction in which the sphere is seen from there, so that no
+    /// photon is drawn on the sphere's far side; or from its whole surface by the cosine.
+    fn emit_from_sphere(&self, sphere: &SphereLight, through: Vec2, u: Vec2) -> Option<EmittedPhoton> {
+        let (center, radius) = (sphere.center.as_dvec3(), f64::from(sphere.radius));
+        let Region::Rectangle { corner, u: across, v: up } = &self.window.region else {
+            let normal = uniform_sphere(u);
+            let point = point_on_sphere(sphere, normal.as_dvec3());
+            let strength = sphere.radiance * (4.0 * PI * sphere.radius * sphere.radius);
+            return self.emit_from_point(&Origin::on(&point, strength), through);
+        };
+        let target = (*corner + *across * through.x + *up * through.y).as_dvec3();
+        let to = center - target;
+        let distance = to.length();
+        if distance <= radius {
+            return None;
+        }
+        let sine = radius / distance;
+        let height = sine * sine / (1.0 + (1.0 - sine * sine).sqrt());
+        let backward = cone_direction(to / distance, height, u);
+        let along = to.dot(backward);
+        let off = to - backward * along;
+        let chord = (radius * radius - off.length_squared()).max(0.0).sqrt();
+        let point = point_on_sphere(sphere, (-off - backward * chord) / radius);
+        let direction = -backward.as_vec3();
+        let area = across.cross(*up).dot(direction).abs();
+        let origin = offset_origin(point.point, point.error, point.normal, point.normal);
+        let solid_angle = 2.0 * PI * height as f32;
+        Some(EmittedPhoton {
+            ray: Ray::new(origin, direction),
+            power: sphere.radiance * (area * solid_angle),
+        })
     }
 
     /// Parallel light through a rectangle perpendicular to it.
@@ -128,14 +190,30 @@ impl<'a> Emission<'a> {
     }
 }
 
-fn point_on_quad(quad: &QuadLight, u: Vec2) -> Origin {
+impl Origin {
+    /// Just off a light's own surface, where it emits `strength` by the cosine.
+    fn on(light: &LightPoint, strength: Vec3) -> Self {
+        let point = offset_origin(light.point, light.error, light.normal, light.normal);
+        Self { point, strength, normal: Some(light.normal) }
+    }
+}
+
+fn point_on_quad(quad: &QuadLight, u: Vec2) -> LightPoint {
     let p = u * 2.0 - 1.0;
-    // Off the light's own surface by the rounding of its corners.
     let point = quad.center + quad.half_u * p.x + quad.half_v * p.y;
     let error = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element() * f32::EPSILON;
-    Origin {
-        point: crate::geometry::offset_origin(point, 2.0 * error, quad.normal, quad.normal),
-        strength: quad.radiance * quad.area(),
-        normal: Some(quad.normal),
-    }
+    LightPoint { point, normal: quad.normal, error: 2.0 * error }
+}
+
+fn point_on_disk(disk: &DiskLight, u: Vec2) -> LightPoint {
+    let (x, y) = disk.normal.any_orthonormal_pair();
+    let p = concentric_disc(u) * disk.radius;
+    let error = (disk.center.abs().max_element() + disk.radius) * (4.0 * f32::EPSILON);
+    LightPoint { point: disk.center + x * p.x + y * p.y, normal: disk.normal, error }
+}
+
+fn point_on_sphere(sphere: &SphereLight, normal: DVec3) -> LightPoint {
+    let point = (sphere.center.as_dvec3() + normal * f64::from(sphere.radius)).as_vec3();
+    let error = point.abs().max(sphere.center.abs()).max_element() * f32::EPSILON;
+    LightPoint { point, normal: normal.as_vec3(), error }
 }

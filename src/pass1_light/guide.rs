@@ -139,7 +139,7 @@ mod tests {
     fn the_density_integrates_to_one_and_covers_everything() {
         let guide = guide();
         let n = 1 << 16;
-        let mut covered = vec![false; 64];
+        let mut covered = [false; 64];
         let mut mean = 0.0;
         for i in 0..n {
             let (at, density) = guide.warp(SamplePoint::new(2, i).get_2d(0));

@@ -6,7 +6,7 @@ use crate::geometry::{Hit, Ray, offset_origin};
 use crate::optics::{self, Interaction, Outcome};
 use crate::photon_map::Photon;
 use crate::sampling::SamplePoint;
-use crate::scene::{Material, ObjectId, Scene};
+use crate::scene::{ObjectId, Scene};
 use glam::Vec3;
 
 /// Sobol dimensions 0 to 3 draw the window and the light; each event takes one more.
@@ -36,6 +36,8 @@ pub(super) fn walk(
 ) -> Fate {
     let EmittedPhoton { mut ray, mut power } = photon;
     let first_power = power.max_element();
+    // Of what the photon flies through.
+    let mut absorption = Vec3::ZERO;
     for bounce in 0..MAX_BOUNCES {
         tally.rays += 1;
         let Some(hit) = scene.geometry.closest_hit(&ray) else {
@@ -54,7 +56,15 @@ pub(super) fn walk(
             }
             tally.hit_caster += 1;
         }
-        let Some(interaction) = specular_interaction(scene, &ray, &hit) else {
+        let material = scene.material_of(hit.object);
+        let came_through = optics::absorption_before(material, ray.direction, &hit.surface, absorption);
+        let left = power * optics::transmittance(came_through, hit.t);
+        tally.energy.absorbed += power.as_dvec3() - left.as_dvec3();
+        power = left;
+        if power == Vec3::ZERO {
+            return Fate::Gone;
+        }
+        let Some(interaction) = optics::interact(material, ray.direction, &hit.surface) else {
             tally.stored += 1;
             tally.energy.stored += power.as_dvec3();
             return Fate::Stored(at_rest(&ray, &hit, power));
@@ -73,20 +83,12 @@ pub(super) fn walk(
         }
         let origin =
             offset_origin(hit.surface.point, hit.surface.error, hit.surface.normal, outcome.direction);
+        absorption = optics::absorption_after(material, &outcome, &hit.surface, came_through);
         ray = Ray::new(origin, outcome.direction);
     }
     tally.cut += 1;
     tally.energy.cut += power.as_dvec3();
     Fate::Gone
-}
-
-/// What the surface does if it is an S, `None` if it is a D.
-fn specular_interaction(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<Interaction> {
-    match scene.material_of(hit.object) {
-        Material::Diffuse { .. } => None,
-        Material::Mirror { reflectance } => Some(optics::mirror(ray.direction, &hit.surface, *reflectance)),
-        Material::Glass { ior } => Some(optics::glass(ray.direction, &hit.surface, *ior)),
-    }
 }
 
 /// Picks reflection or refraction in proportion to their shares; also the factor on the photon's power.

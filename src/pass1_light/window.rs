@@ -4,9 +4,9 @@
 //! overlap and no light is counted twice.
 
 use super::guide::Guide;
-use crate::geometry::{Geometry, HullPoint};
+use crate::geometry::{Bounds, Geometry, HullPoint};
 use crate::light_path::Bounce;
-use crate::scene::{Light, LightId, ObjectId, Scene};
+use crate::scene::{Light, LightId, ObjectId, Scene, SphereLight};
 use glam::{Vec2, Vec3};
 
 /// What sends light.
@@ -96,10 +96,36 @@ fn region(light: &Light, geometry: &Geometry, caster: ObjectId, hull: &[HullPoin
     match light {
         Light::Directional { direction, .. } => parallel_window(center, *direction, hull),
         Light::Point { position, .. } => seen_from(&[*position], center, hull),
-        // A projection through a fixed point maps the light's convex hull to a convex hull, so that its four
-        // corners bound what any of its points sees.
+        // A projection through a fixed point maps the light's convex hull to a convex hull, so that the corners
+        // of a hull bound what any of its points sees.
         Light::Quad(quad) => seen_from(&quad.corners(), center, hull),
+        Light::Disk(disk) => seen_from(&disk.square().corners(), center, hull),
+        Light::Sphere(sphere) => seen_from(&cube_around(sphere, center), center, hull),
+        Light::Mesh(mesh) => seen_from(&Bounds::of(mesh.corners()).corners(), center, hull),
+        Light::Spot(spot) => {
+            let region = seen_from(&[spot.position], center, hull);
+            let cone = 2.0 * std::f32::consts::PI * (1.0 - spot.cos_outer);
+            match &region {
+                // The whole cone where it is narrower than the window.
+                Region::Rectangle { u, v, .. }
+                    if u.length() * v.length() > cone * spot.position.distance_squared(center) =>
+                {
+                    Region::AllDirections
+                }
+                _ => region,
+            }
+        }
     }
+}
+
+/// Corners of a cube around the sphere, turned to face `target`: across, it is no wider than the sphere.
+fn cube_around(sphere: &SphereLight, target: Vec3) -> [Vec3; 8] {
+    let normal = (sphere.center - target).normalize_or(Vec3::Y);
+    let (x, y) = normal.any_orthonormal_pair();
+    std::array::from_fn(|i| {
+        let sign = |bit: usize| if i & bit == 0 { -sphere.radius } else { sphere.radius };
+        sphere.center + x * sign(1) + y * sign(2) + normal * sign(4)
+    })
 }
 
 fn enclosing_disc(geometry: &Geometry, caster: ObjectId) -> Region {
@@ -116,6 +142,10 @@ fn seen_from(eyes: &[Vec3], center: Vec3, hull: &[HullPoint]) -> Region {
     for eye in eyes {
         let from = *eye - center;
         let (ex, ey, height) = (from.dot(x), from.dot(y), from.dot(normal));
+        // A light that reaches below the plane through the caster's centre sees it from all around.
+        if height <= 0.0 {
+            return Region::AllDirections;
+        }
         for point in hull {
             let q = point.position - center;
             let h = q.dot(normal);

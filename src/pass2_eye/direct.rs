@@ -1,20 +1,26 @@
 //! Pass 2, `LD`: light that reaches a D straight from the lights, by shadow rays.
 
 use crate::geometry::{Ray, SurfacePoint, offset_origin};
+use crate::optics::transmittance;
 use crate::sampling::{SamplePoint, cosine_hemisphere};
-use crate::scene::{Light, QuadLight, Scene};
+use crate::scene::{Light, Scene, SpotLight};
 use glam::Vec3;
 use std::f32::consts::PI;
 
+mod area;
 mod spherical_rectangle;
+mod strata;
 
-use spherical_rectangle::SphericalRectangle;
+use area::{from_disk, from_mesh, from_quad, from_sphere};
+use strata::Strata;
 
 /// The surface that is lit, on the side that is seen.
 pub(super) struct Receiver<'a> {
     pub(super) surface: &'a SurfacePoint,
     /// Normal on the side that is seen.
     pub(super) normal: Vec3,
+    /// Absorption coefficient of the medium on that side.
+    pub(super) absorption: Vec3,
 }
 
 /// A direction from which light may come.
@@ -27,7 +33,7 @@ struct Incident {
     irradiance: Vec3,
 }
 
-/// Irradiance of all lights at a D, one shadow ray each.
+/// Irradiance of all lights at a D, one shadow ray each unless the scene asks for more.
 pub(super) fn direct_light(
     scene: &Scene,
     receiver: &Receiver<'_>,
@@ -37,10 +43,19 @@ pub(super) fn direct_light(
     let mut sum = Vec3::ZERO;
     for (i, light) in scene.lights.iter().enumerate() {
         let sample = if i == 0 { sample } else { sample.branch(i as u64) };
+        let mut strata = Strata { scene, receiver, light, shadow_rays };
+        if let Some(irradiance) = strata.irradiance(sample) {
+            sum += irradiance;
+            continue;
+        }
         let incident = match light {
             Light::Point { position, intensity } => from_point(receiver, *position, *intensity),
             Light::Directional { direction, irradiance } => from_afar(receiver, *direction, *irradiance),
-            Light::Quad(quad) => from_quad(receiver, quad, sample),
+            Light::Spot(spot) => from_spot(receiver, spot),
+            Light::Quad(quad) => from_quad(receiver, quad, sample.get_2d(2)),
+            Light::Disk(disk) => from_disk(receiver, disk, sample.get_2d(2)),
+            Light::Sphere(sphere) => from_sphere(receiver, sphere, sample.get_2d(2)),
+            Light::Mesh(mesh) => from_mesh(receiver, mesh, sample.get_2d(2)),
         };
         sum += visible(scene, receiver, incident, shadow_rays);
     }
@@ -67,7 +82,8 @@ fn visible(scene: &Scene, receiver: &Receiver<'_>, incident: Option<Incident>, r
     if scene.geometry.any_hit(&Ray::new(origin, incident.direction), incident.distance) {
         return Vec3::ZERO;
     }
-    incident.irradiance
+    // Nothing was met on the way, so that the light is in the same medium.
+    incident.irradiance * transmittance(receiver.absorption, incident.distance)
 }
 
 fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Option<Incident> {
@@ -84,6 +100,12 @@ fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Optio
     (cosine > 0.0).then_some(Incident { direction, distance: short_of(distance), irradiance })
 }
 
+fn from_spot(receiver: &Receiver<'_>, spot: &SpotLight) -> Option<Incident> {
+    let mut incident = from_point(receiver, spot.position, Vec3::ONE)?;
+    incident.irradiance *= spot.intensity_along(-incident.direction);
+    Some(incident)
+}
+
 fn from_afar(receiver: &Receiver<'_>, direction: Vec3, irradiance: Vec3) -> Option<Incident> {
     let cosine = -receiver.normal.dot(direction);
     (cosine > 0.0).then_some(Incident {
@@ -91,25 +113,6 @@ fn from_afar(receiver: &Receiver<'_>, direction: Vec3, irradiance: Vec3) -> Opti
         distance: f32::INFINITY,
         irradiance: irradiance * cosine,
     })
-}
-
-/// A direction to the rectangle uniform in solid angle, so that near and slanting lights are no noisier than
-/// the cosine at the receiver.
-fn from_quad(receiver: &Receiver<'_>, quad: &QuadLight, sample: SamplePoint) -> Option<Incident> {
-    let from = receiver.surface.point;
-    if (from - quad.center).dot(quad.normal) <= 0.0 {
-        return None;
-    }
-    let rectangle = SphericalRectangle::new(quad, from)?;
-    let target = rectangle.sample(sample.get_2d(2));
-    let error = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element() * f32::EPSILON;
-    let target = offset_origin(target, 4.0 * error, quad.normal, quad.normal);
-    let to = target - from;
-    let distance = to.length();
-    let direction = to.try_normalize()?;
-    let cosine = receiver.normal.dot(direction);
-    let irradiance = quad.radiance * (cosine.max(0.0) * rectangle.solid_angle);
-    (cosine > 0.0).then_some(Incident { direction, distance: short_of(distance), irradiance })
 }
 
 /// A few ulps less, so that rounding of the distance cannot put the shadow ray's end behind the light.

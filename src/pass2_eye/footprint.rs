@@ -8,7 +8,7 @@
 use crate::geometry::{Hit, Ray, SheetId, offset_origin};
 use crate::optics::{self, Interaction};
 use crate::sampling::hash;
-use crate::scene::{Material, Scene};
+use crate::scene::Scene;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -65,10 +65,14 @@ const SAME_FACE: f32 = 0.95;
 const STRAIGHTNESS: f32 = 0.1;
 
 impl Footprints {
-    /// Traces the corners of all pixels.
+    /// Traces the corners of all pixels. Through a lens no pixel has a footprint.
     #[must_use]
     pub fn trace(scene: &Scene) -> Self {
         let (width, height) = (scene.image.width as usize, scene.image.height as usize);
+        if scene.camera.lens().is_some() {
+            // Through a lens a pixel sees more than lies between its corners: photons are looked up instead.
+            return Self { width, pixels: vec![None; width * height] };
+        }
         let corners: Vec<Vec<Option<Landing>>> = (0..=height)
             .into_par_iter()
             .map(|y| (0..=width).map(|x| land(scene, Vec2::new(x as f32, y as f32))).collect())
@@ -172,9 +176,5 @@ fn land(scene: &Scene, raster: Vec2) -> Option<Landing> {
 
 /// What the surface does if it is an S.
 fn interact(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<Interaction> {
-    match scene.material_of(hit.object) {
-        Material::Diffuse { .. } => None,
-        Material::Mirror { reflectance } => Some(optics::mirror(ray.direction, &hit.surface, *reflectance)),
-        Material::Glass { ior } => Some(optics::glass(ray.direction, &hit.surface, *ior)),
-    }
+    optics::interact(scene.material_of(hit.object), ray.direction, &hit.surface)
 }

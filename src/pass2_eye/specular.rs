@@ -14,7 +14,7 @@ use crate::light_path::PathClass;
 use crate::optics::{self, Event, Interaction, Outcome};
 use crate::photon_map::Lookup;
 use crate::sampling::SamplePoint;
-use crate::scene::{Light, Material, Texture};
+use crate::scene::{Material, Texture};
 use glam::{Vec2, Vec3};
 
 /// Both ways are followed while each still carries this share of the pixel.
@@ -28,6 +28,9 @@ const MAX_BOUNCES: u32 = 64;
 
 /// Sobol dimensions 0 and 1 place the sample in the pixel, 2 to 5 light the D; then two per S.
 const FIRST_EVENT_DIMENSION: u32 = 6;
+
+/// The lens is drawn from these two dimensions of the sample itself; D and S draw from its branches.
+const LENS_DIMENSION: u32 = 14;
 
 /// What the rays of pass 2 did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,8 +69,8 @@ pub(super) enum Lookups {
 /// Follows eye rays; owns the stack of branches yet to follow.
 pub(super) struct EyeWalk<'a> {
     context: &'a EyeContext<'a>,
-    /// Radius of the density estimate per metre of the eye ray's way.
-    kernel_spread: f32,
+    /// Radius of the density estimate in pixels.
+    kernel_pixels: f32,
     stack: Vec<Branch>,
     /// The eye sample that is being followed.
     half: usize,
@@ -82,6 +85,8 @@ pub(super) struct EyeWalk<'a> {
 struct Branch {
     ray: Ray,
     throughput: Vec3,
+    /// Absorption coefficient of what the ray goes through.
+    absorption: Vec3,
     bounces: u32,
     /// Length of the way from the eye.
     travelled: f32,
@@ -93,12 +98,11 @@ struct Branch {
 
 impl<'a> EyeWalk<'a> {
     pub(super) fn new(context: &'a EyeContext<'a>) -> Self {
-        let pixels = context.plan.radius.pixels(context.round) as f32;
-        let kernel_spread = context.scene.camera.pixel_spread() * pixels;
+        let kernel_pixels = context.plan.radius.pixels(context.round) as f32;
         let sample = SamplePoint::new(0, 0);
         Self {
             context,
-            kernel_spread,
+            kernel_pixels,
             stack: Vec::new(),
             half: 0,
             sample,
@@ -116,11 +120,16 @@ impl<'a> EyeWalk<'a> {
 
     /// Adds what arrives along one eye ray to the classes' sums.
     pub(super) fn trace(&mut self, raster: Vec2, sums: &mut PixelSums) {
-        let ray = self.context.scene.camera.ray(raster);
+        let camera = &self.context.scene.camera;
+        let ray = match camera.lens() {
+            Some(lens) => camera.ray_through(lens, raster, self.sample.get_2d(LENS_DIMENSION)),
+            None => camera.ray(raster),
+        };
         self.stack.clear();
         self.stack.push(Branch {
             ray,
             throughput: Vec3::ONE,
+            absorption: Vec3::ZERO,
             bounces: 0,
             travelled: 0.0,
             key: 1,
@@ -131,22 +140,24 @@ impl<'a> EyeWalk<'a> {
         }
     }
 
-    fn follow(&mut self, branch: Branch, sums: &mut PixelSums) {
+    fn follow(&mut self, mut branch: Branch, sums: &mut PixelSums) {
         let scene = self.context.scene;
         self.counts.eye_rays += 1;
         let Some(hit) = scene.geometry.closest_hit(&branch.ray) else {
-            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * scene.environment);
+            let throughput = branch.throughput * optics::transmittance(branch.absorption, f32::INFINITY);
+            sums.halves[self.half].classes.add(PathClass::Emitted, throughput * scene.environment);
             return;
         };
-        match scene.material_of(hit.object) {
+        let material = scene.material_of(hit.object);
+        let direction = branch.ray.direction;
+        branch.absorption = optics::absorption_before(material, direction, &hit.surface, branch.absorption);
+        branch.throughput *= optics::transmittance(branch.absorption, hit.t);
+        match material {
             Material::Diffuse { albedo } => self.arrive(&branch, &hit, albedo, sums),
-            Material::Mirror { reflectance } => {
-                let interaction = optics::mirror(branch.ray.direction, &hit.surface, *reflectance);
-                self.scatter(&branch, &hit, &interaction);
-            }
-            Material::Glass { ior } => {
-                let interaction = optics::glass(branch.ray.direction, &hit.surface, *ior);
-                self.scatter(&branch, &hit, &interaction);
+            Material::Mirror { .. } | Material::Metal(_) | Material::Glass { .. } => {
+                if let Some(interaction) = optics::interact(material, direction, &hit.surface) {
+                    self.scatter(&branch, &hit, &interaction);
+                }
             }
         }
     }
@@ -190,9 +201,11 @@ impl<'a> EyeWalk<'a> {
         }
         let surface = &hit.surface;
         let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
+        let material = self.context.scene.material_of(hit.object);
         self.stack.push(Branch {
             ray: Ray::new(origin, outcome.direction),
             throughput,
+            absorption: optics::absorption_after(material, outcome, surface, branch.absorption),
             bounces: branch.bounces + 1,
             travelled: branch.travelled + hit.t,
             key: outcome.extend_key(branch.key),
@@ -206,9 +219,9 @@ impl<'a> EyeWalk<'a> {
         let backside = branch.ray.direction.dot(hit.surface.normal) > 0.0;
         if let Some(light) = scene.objects[hit.object.index()].emitter
             && !backside
-            && let Light::Quad(quad) = &scene.lights[light.index()]
+            && let Some(radiance) = scene.lights[light.index()].surface_radiance()
         {
-            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * quad.radiance);
+            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * radiance);
         }
         let albedo = albedo.eval(hit.surface.uv);
         if albedo == Vec3::ZERO {
@@ -217,7 +230,7 @@ impl<'a> EyeWalk<'a> {
         // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
         let weight = branch.throughput * albedo / std::f32::consts::PI;
         let normal = if backside { -hit.surface.normal } else { hit.surface.normal };
-        let receiver = Receiver { surface: &hit.surface, normal };
+        let receiver = Receiver { surface: &hit.surface, normal, absorption: branch.absorption };
         let sample = self.sample.branch(branch.key);
         let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
         sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);
@@ -238,7 +251,7 @@ impl<'a> EyeWalk<'a> {
     /// Irradiance by density estimation around the point, with a kernel of about a pixel.
     fn look_up(&mut self, branch: &Branch, hit: &Hit, normal: Vec3) -> Vec3 {
         let Some(photons) = self.context.photons else { return Vec3::ZERO };
-        let radius = (branch.travelled + hit.t) * self.kernel_spread;
+        let radius = self.context.scene.camera.pixel_width(branch.travelled + hit.t) * self.kernel_pixels;
         let point = hit.surface.point;
         let lookup = Lookup { point, normal, sheet: hit.sheet, radius };
         self.counts.lookups += 1;

@@ -1,12 +1,13 @@
-//! The pinhole camera: from a point of the image to a ray.
+//! The camera: from a point of the image, and of the lens, to a ray.
 
 use crate::geometry::Ray;
+use crate::sampling::concentric_disc;
 use glam::{Vec2, Vec3};
 
-/// A pinhole camera looking along `forward`.
+/// A camera looking along `forward`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// Position of the pinhole.
+    /// Position of the pinhole, or of the middle of the plane that the rays start from.
     pub eye: Vec3,
     /// Unit viewing direction.
     pub forward: Vec3,
@@ -14,10 +15,36 @@ pub struct Camera {
     pub right: Vec3,
     /// Unit vector to the top of the image.
     pub up: Vec3,
-    /// Tangent of half the vertical field of view.
-    pub tan_half_fov: f32,
+    /// How the picture grows with the distance.
+    pub projection: Projection,
     /// Pixels across and down.
     pub resolution: Vec2,
+}
+
+/// How the picture grows with the distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// All rays come through one point or, with a lens, through a disc around it.
+    Perspective {
+        /// Tangent of half the vertical field of view.
+        tan_half_fov: f32,
+        /// The lens; `None` is a pinhole.
+        lens: Option<Lens>,
+    },
+    /// All rays are parallel.
+    Orthographic {
+        /// Height of what is seen.
+        height: f32,
+    },
+}
+
+/// A thin lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    /// Radius of the disc.
+    pub radius: f32,
+    /// Distance along the viewing direction of the plane that is sharp.
+    pub focus_distance: f32,
 }
 
 impl Camera {
@@ -27,7 +54,7 @@ impl Camera {
         eye: Vec3,
         target: Vec3,
         up: Vec3,
-        vertical_fov_deg: f32,
+        projection: Projection,
         resolution: Vec2,
     ) -> Option<Self> {
         let forward = (target - eye).try_normalize()?;
@@ -38,23 +65,65 @@ impl Camera {
             return None;
         }
         let right = right.normalize();
-        let tan_half_fov = libm::tanf(vertical_fov_deg.to_radians() * 0.5);
-        Some(Self { eye, forward, right, up: right.cross(forward), tan_half_fov, resolution })
+        Some(Self { eye, forward, right, up: right.cross(forward), projection, resolution })
     }
 
-    /// The ray through a raster position in pixels, x to the right and y down from the top left corner.
+    /// The lens, if the camera is not a pinhole.
+    #[must_use]
+    pub fn lens(&self) -> Option<&Lens> {
+        match &self.projection {
+            Projection::Perspective { lens, .. } => lens.as_ref(),
+            Projection::Orthographic { .. } => None,
+        }
+    }
+
+    /// The ray through a raster position in pixels, x to the right and y down from the top left corner, and
+    /// through the middle of the lens.
     #[must_use]
     pub fn ray(&self, raster: Vec2) -> Ray {
-        let ndc = raster / self.resolution * 2.0 - 1.0;
-        let aspect = self.resolution.x / self.resolution.y;
-        let x = ndc.x * self.tan_half_fov * aspect;
-        let y = -ndc.y * self.tan_half_fov;
-        Ray::new(self.eye, (self.forward + self.right * x + self.up * y).normalize())
+        match self.projection {
+            Projection::Perspective { tan_half_fov, .. } => {
+                Ray::new(self.eye, self.towards(raster, tan_half_fov).normalize())
+            }
+            Projection::Orthographic { height } => {
+                let p = self.on_screen(raster, 0.5 * height);
+                Ray::new(self.eye + self.right * p.x + self.up * p.y, self.forward)
+            }
+        }
     }
 
-    /// Width of a pixel at distance 1 in front of the eye.
+    /// The ray through a raster position and a point of the lens, drawn with `u` uniform in the unit square.
     #[must_use]
-    pub fn pixel_spread(&self) -> f32 {
-        2.0 * self.tan_half_fov / self.resolution.y
+    pub fn ray_through(&self, lens: &Lens, raster: Vec2, u: Vec2) -> Ray {
+        let Projection::Perspective { tan_half_fov, .. } = self.projection else { return self.ray(raster) };
+        let p = concentric_disc(u) * lens.radius;
+        let aside = self.right * p.x + self.up * p.y;
+        // Both ends relative to the eye, so that no digits are lost far from the origin.
+        let to_focus = self.towards(raster, tan_half_fov) * lens.focus_distance - aside;
+        Ray::new(self.eye + aside, to_focus.normalize())
+    }
+
+    /// From the eye to the plane at distance 1.
+    fn towards(&self, raster: Vec2, tan_half_fov: f32) -> Vec3 {
+        let p = self.on_screen(raster, tan_half_fov);
+        self.forward + self.right * p.x + self.up * p.y
+    }
+
+    /// Where a raster position lies on a screen of this half height.
+    fn on_screen(&self, raster: Vec2, half_height: f32) -> Vec2 {
+        let ndc = raster / self.resolution * 2.0 - 1.0;
+        let aspect = self.resolution.x / self.resolution.y;
+        Vec2::new(ndc.x * half_height * aspect, -ndc.y * half_height)
+    }
+
+    /// Width of a pixel at a distance from the eye.
+    #[must_use]
+    pub fn pixel_width(&self, distance: f32) -> f32 {
+        match self.projection {
+            Projection::Perspective { tan_half_fov, .. } => {
+                distance * (2.0 * tan_half_fov / self.resolution.y)
+            }
+            Projection::Orthographic { height } => height / self.resolution.y,
+        }
     }
 }

@@ -4,12 +4,13 @@
 
 use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
+use super::light_file::LightFile;
 use super::read::{
-    Context, Decode, Fields, choice, color, count, direction, name, named, note_duplicates, object, optional,
-    or, pair, part, point, real, record, reference, required, seed, size2, slots, tagged,
+    Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, name, named, note_duplicates,
+    object, optional, or, pair, part, point, real, record, reference, required, seed, slots, tagged,
 };
 use super::shape_file::ShapeFile;
-use super::{Paths, Tone};
+use super::{LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
 use std::collections::BTreeSet;
@@ -18,6 +19,10 @@ use std::collections::BTreeSet;
 const VERSION: f64 = 1.0;
 /// Most pixels across or down.
 const MAX_IMAGE_SIDE: u32 = 16_384;
+/// Largest index of refraction.
+const MAX_INDEX: f64 = 100.0;
+/// Squares along each side of a light, if not given.
+const LIGHT_GRID: u32 = 4;
 
 /// Reads a scene file as far as it is right. What is wrong is noted, and missing in the result.
 pub(super) fn read_scene_file(root: &Node<'_>, issues: &mut Issues) -> Option<SceneFile> {
@@ -82,13 +87,14 @@ tagged! {
     /// A camera.
     CameraFile {
         "perspective" => Perspective(PerspectiveFile),
+        "orthographic" => Orthographic(OrthographicFile),
     }
 }
 
 record! {
-    /// A pinhole camera.
+    /// A pinhole or thin-lens camera.
     PerspectiveFile {
-        /// Position of the pinhole.
+        /// Position of the pinhole, or of the lens's centre.
         eye: [f64; 3] = required(point()),
         /// A point in the middle of the picture.
         target: [f64; 3] = required(point()),
@@ -96,6 +102,25 @@ record! {
         up: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
         /// Vertical field of view in degrees.
         fov: f64 = required(real("vertical field of view in degrees").above(0.0).below(180.0)),
+        /// Diameter of the lens in metres; 0 is a pinhole.
+        aperture: f64 = or(real("diameter of the lens in metres").between(0.0, MAX_LENGTH), 0.0),
+        /// Distance from the lens, along the view, of the plane that is sharp, in metres; that of the target if
+        /// left out.
+        focus_distance: Option<f64> = optional(real("distance in metres").positive_length()),
+    }
+}
+
+record! {
+    /// A camera whose rays are parallel: things keep their size at any distance.
+    OrthographicFile {
+        /// A point of the plane that the rays start from: what is behind it is not seen.
+        eye: [f64; 3] = required(point()),
+        /// A point in the middle of the picture.
+        target: [f64; 3] = required(point()),
+        /// The direction that is up in the picture.
+        up: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
+        /// Height of what is seen, in metres.
+        height: f64 = required(real("height in metres").positive_length()),
     }
 }
 
@@ -104,6 +129,7 @@ tagged! {
     MaterialFile {
         "diffuse" => Diffuse(DiffuseFile),
         "mirror" => Mirror(MirrorFile),
+        "metal" => Metal(MetalFile),
         "glass" => Glass(GlassFile),
     }
 }
@@ -152,10 +178,24 @@ record! {
 }
 
 record! {
+    /// Smooth metal: either `f0`, or `n` and `k`.
+    MetalFile {
+        /// Fraction of the light reflected at normal incidence; more at an angle by Schlick's approximation.
+        f0: Option<[f64; 3]> = optional(color("reflectance").fraction()),
+        /// Real part of the index of refraction, per channel; at an angle Fresnel's equations hold.
+        n: Option<[f64; 3]> = optional(color("real part of the index of refraction").up_to(MAX_INDEX)),
+        /// Imaginary part of the index of refraction, per channel.
+        k: Option<[f64; 3]> = optional(color("imaginary part of the index of refraction").up_to(MAX_INDEX)),
+    }
+}
+
+record! {
     /// Smooth glass.
     GlassFile {
         /// Index of refraction.
-        ior: f64 = required(real("index of refraction").above(0.0).at_most(100.0)),
+        ior: f64 = required(real("index of refraction").above(0.0).at_most(MAX_INDEX)),
+        /// Absorption coefficient per channel, m⁻¹: inside, light falls to 1/e over its reciprocal.
+        absorption: [f64; 3] = or(color("absorption per metre"), [0.0; 3]),
     }
 }
 
@@ -166,54 +206,12 @@ record! {
         name: Option<String> = optional(name()),
         /// Name of its material.
         material: String = required(reference()),
+        /// Radiance of its front, W·sr⁻¹·m⁻²: the outside of a sphere, the side of a polygon or mesh from which
+        /// its vertices run anticlockwise. Makes the object a light; it still reflects by its material.
+        emission: Option<[f64; 3]> = optional(color("emission")),
         ..
         /// Its shape.
         shape: ShapeFile
-    }
-}
-
-tagged! {
-    /// A light.
-    LightFile {
-        "point" => Point(PointLightFile),
-        "directional" => Directional(DirectionalLightFile),
-        "quad" => Quad(QuadLightFile),
-    }
-}
-
-record! {
-    /// A light that is a point.
-    PointLightFile {
-        /// Where it is.
-        position: [f64; 3] = required(point()),
-        /// Radiant intensity, W·sr⁻¹.
-        intensity: [f64; 3] = required(color("intensity")),
-    }
-}
-
-record! {
-    /// Parallel light.
-    DirectionalLightFile {
-        /// The direction in which the light travels.
-        direction: [f64; 3] = required(direction()),
-        /// Irradiance on a surface that faces the light, W·m⁻².
-        irradiance: [f64; 3] = required(color("irradiance")),
-    }
-}
-
-record! {
-    /// A rectangle that emits to one side.
-    QuadLightFile {
-        /// Centre.
-        center: [f64; 3] = required(point()),
-        /// Width and height.
-        size: [f64; 2] = required(size2()),
-        /// A point the light faces.
-        towards: [f64; 3] = required(point()),
-        /// Direction of the width; horizontal if left out.
-        edge: Option<[f64; 3]> = optional(direction()),
-        /// Radiance, W·sr⁻¹·m⁻².
-        radiance: [f64; 3] = required(color("radiance")),
     }
 }
 
@@ -227,7 +225,6 @@ record! {
 
 record! {
     /// What is asked of the renderer.
-    #[derive(Default)]
     RenderFile {
         /// Which light paths are computed.
         paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
@@ -237,8 +234,26 @@ record! {
         radius: RadiusRule = or(choice(RadiusRule::NAMED.to_vec()), RadiusRule::Pixel),
         /// The structure that finds what a ray meets; all find the same.
         structure: Structure = or(choice(Structure::NAMED.to_vec()), Structure::Auto),
+        /// How quad and disk lights are sampled.
+        light_sampling: LightSampling = or(choice(LightSampling::NAMED.to_vec()), LightSampling::Sobol),
+        /// Squares along each side of such a light, unless it is sampled by `sobol`.
+        light_grid: u32 = or(count("squares along each side of a light", 1, 64), LIGHT_GRID),
         /// Seed of every random stream.
         seed: u64 = or(seed(), 0),
+    }
+}
+
+impl Default for RenderFile {
+    fn default() -> Self {
+        Self {
+            paths: Paths::default(),
+            stop: None,
+            radius: RadiusRule::default(),
+            structure: Structure::default(),
+            light_sampling: LightSampling::default(),
+            light_grid: LIGHT_GRID,
+            seed: 0,
+        }
     }
 }
 

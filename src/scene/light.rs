@@ -1,6 +1,6 @@
 //! Lights. Emission for pass 1 is in `pass1_light::emit`, sampling for pass 2 in `pass2_eye::direct`.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// A source of light. Quantities are per channel.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +12,8 @@ pub enum Light {
         /// Radiant intensity, W·sr⁻¹.
         intensity: Vec3,
     },
+    /// A point whose light is confined to a cone.
+    Spot(SpotLight),
     /// Parallel light from infinitely far away.
     Directional {
         /// Unit vector in which the light travels.
@@ -21,6 +23,154 @@ pub enum Light {
     },
     /// A one-sided rectangle of constant radiance.
     Quad(QuadLight),
+    /// A one-sided disk of constant radiance.
+    Disk(DiskLight),
+    /// A sphere of constant radiance.
+    Sphere(SphereLight),
+    /// Triangles of constant radiance: an object with an emission.
+    Mesh(MeshLight),
+}
+
+/// A point whose light is confined to a cone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpotLight {
+    /// Where it is.
+    pub position: Vec3,
+    /// Unit vector along the axis, away from the light.
+    pub axis: Vec3,
+    /// Radiant intensity inside the inner cone, W·sr⁻¹.
+    pub intensity: Vec3,
+    /// Cosine of the angle from the axis at which the light begins to fall.
+    pub cos_inner: f32,
+    /// Cosine of the angle from the axis at which it has fallen to nothing.
+    pub cos_outer: f32,
+}
+
+impl SpotLight {
+    /// Intensity in a direction away from the light: s² (3 - 2s) times that on the axis, where s runs from 0
+    /// at the outer cone to 1 at the inner one, linear in the cosine.
+    #[must_use]
+    pub fn intensity_along(&self, direction: Vec3) -> Vec3 {
+        let cosine = self.axis.dot(direction);
+        if cosine >= self.cos_inner {
+            return self.intensity;
+        }
+        if cosine <= self.cos_outer {
+            return Vec3::ZERO;
+        }
+        let s = (cosine - self.cos_outer) / (self.cos_inner - self.cos_outer);
+        self.intensity * (s * s * (3.0 - 2.0 * s))
+    }
+}
+
+/// A one-sided disk of constant radiance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiskLight {
+    /// Centre.
+    pub center: Vec3,
+    /// Radius.
+    pub radius: f32,
+    /// Unit normal of the side that emits.
+    pub normal: Vec3,
+    /// Radiance, W·sr⁻¹·m⁻².
+    pub radiance: Vec3,
+}
+
+impl DiskLight {
+    /// Area in m².
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        std::f32::consts::PI * self.radius * self.radius
+    }
+
+    /// The square around the disk, as a light of the same radiance.
+    #[must_use]
+    pub fn square(&self) -> QuadLight {
+        let (x, y) = self.normal.any_orthonormal_pair();
+        let (half_u, half_v) = (x * self.radius, y * self.radius);
+        QuadLight { center: self.center, half_u, half_v, normal: self.normal, radiance: self.radiance }
+    }
+}
+
+/// A sphere of constant radiance; it emits outwards.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SphereLight {
+    /// Centre.
+    pub center: Vec3,
+    /// Radius.
+    pub radius: f32,
+    /// Radiance, W·sr⁻¹·m⁻².
+    pub radiance: Vec3,
+}
+
+/// Triangles of constant radiance; each emits to the side of its normal by the right-hand rule.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshLight {
+    /// Radiance, W·sr⁻¹·m⁻².
+    pub radiance: Vec3,
+    triangles: Vec<[Vec3; 3]>,
+    /// Areas summed up to and with each triangle, m².
+    sums: Vec<f64>,
+}
+
+/// A point of a light's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPoint {
+    /// Position.
+    pub point: Vec3,
+    /// Unit normal of the side that emits.
+    pub normal: Vec3,
+    /// Bound on how far each coordinate of `point` is from the true surface.
+    pub error: f32,
+}
+
+impl MeshLight {
+    /// Triangles without area are left out.
+    #[must_use]
+    pub fn new(radiance: Vec3, triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Self {
+        let mut light = Self { radiance, triangles: Vec::new(), sums: Vec::new() };
+        let mut sum = 0.0;
+        for triangle in triangles {
+            let area = doubled_area(&triangle).length() / 2.0;
+            if area > 0.0 {
+                sum += area;
+                light.triangles.push(triangle);
+                light.sums.push(sum);
+            }
+        }
+        light
+    }
+
+    /// Area in m².
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        self.sums.last().copied().unwrap_or(0.0) as f32
+    }
+
+    /// All corners of all triangles.
+    pub fn corners(&self) -> impl Iterator<Item = Vec3> + '_ {
+        self.triangles.iter().flatten().copied()
+    }
+
+    /// A point uniform over the area for `u` uniform in the unit square; `None` if there is no area.
+    #[must_use]
+    pub fn sample(&self, u: glam::Vec2) -> Option<LightPoint> {
+        let target = f64::from(u.x) * self.sums.last()?;
+        let index = self.sums.partition_point(|&sum| sum <= target).min(self.triangles.len() - 1);
+        let before = if index == 0 { 0.0 } else { self.sums[index - 1] };
+        let [a, b, c] = self.triangles[index];
+        // What is left of u.x within its triangle is uniform again.
+        let left = ((target - before) / (self.sums[index] - before)).clamp(0.0, 1.0);
+        let root = left.sqrt() as f32;
+        let point = a + (b - a) * (root * (1.0 - u.y)) + (c - a) * (root * u.y);
+        let error = a.abs().max(b.abs()).max(c.abs()).max_element() * (4.0 * f32::EPSILON);
+        Some(LightPoint { point, normal: doubled_area(&[a, b, c]).normalize().as_vec3(), error })
+    }
+}
+
+/// Normal by the right-hand rule, as long as twice the area.
+fn doubled_area([a, b, c]: &[Vec3; 3]) -> DVec3 {
+    (b.as_dvec3() - a.as_dvec3()).cross(c.as_dvec3() - a.as_dvec3())
 }
 
 /// A one-sided rectangle of constant radiance.
@@ -59,9 +209,39 @@ impl Light {
     pub fn is_dark(&self) -> bool {
         let power = match self {
             Self::Point { intensity, .. } => *intensity,
+            Self::Spot(spot) => spot.intensity,
             Self::Directional { irradiance, .. } => *irradiance,
             Self::Quad(quad) => quad.radiance * quad.area(),
+            Self::Disk(disk) => disk.radiance,
+            Self::Sphere(sphere) => sphere.radiance,
+            Self::Mesh(mesh) => mesh.radiance * mesh.area(),
         };
         power == Vec3::ZERO
+    }
+
+    /// Radiance of the side of its surface that emits; `None` of a light that has no surface.
+    #[must_use]
+    pub fn surface_radiance(&self) -> Option<Vec3> {
+        match self {
+            Self::Point { .. } | Self::Spot(_) | Self::Directional { .. } => None,
+            Self::Quad(quad) => Some(quad.radiance),
+            Self::Disk(disk) => Some(disk.radiance),
+            Self::Sphere(sphere) => Some(sphere.radiance),
+            Self::Mesh(mesh) => Some(mesh.radiance),
+        }
+    }
+
+    /// The light's kind, for reports.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Point { .. } => "point",
+            Self::Spot(_) => "spot",
+            Self::Directional { .. } => "directional",
+            Self::Quad(_) => "quad",
+            Self::Disk(_) => "disk",
+            Self::Sphere(_) => "sphere",
+            Self::Mesh(_) => "emissive",
+        }
     }
 }

@@ -10,16 +10,17 @@ mod file;
 mod issue;
 mod json;
 mod light;
+mod light_file;
 mod material;
 mod mesh_file;
 mod read;
 mod shape_file;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
-pub use camera::Camera;
+pub use camera::{Camera, Lens, Projection};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
-pub use light::{Light, QuadLight};
-pub use material::{Material, Texture};
+pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
+pub use material::{Conductor, Material, Texture};
 
 use crate::geometry::{Geometry, Structure};
 use crate::radius::RadiusRule;
@@ -140,8 +141,33 @@ impl std::str::FromStr for Paths {
     }
 }
 
+/// How a quad or disk light is sampled at a D.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum LightSampling {
+    /// One point per eye sample, from the sample's Sobol sequence; quads by solid angle.
+    #[default]
+    Sobol,
+    /// The centres of a regular grid: the same for every eye sample, so that shadows show bands.
+    Grid,
+    /// A random point in each square of the grid.
+    Jittered,
+    /// The corners of each square; where they disagree on whether they are seen, the square is divided. What is
+    /// smaller than a square and hides none of its corners is missed, whatever the number of eye samples.
+    Adaptive,
+}
+
+impl LightSampling {
+    /// Every value and its name.
+    pub const NAMED: [(&str, Self); 4] = [
+        ("sobol", Self::Sobol),
+        ("grid", Self::Grid),
+        ("jittered", Self::Jittered),
+        ("adaptive", Self::Adaptive),
+    ];
+}
+
 /// What the scene file asks of the renderer.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
     /// Which light paths are computed.
     pub paths: Paths,
@@ -151,6 +177,10 @@ pub struct RenderSettings {
     pub radius: RadiusRule,
     /// The structure over the primitives.
     pub structure: Structure,
+    /// How quad and disk lights are sampled.
+    pub light_sampling: LightSampling,
+    /// Squares along each side of such a light, where it is not sampled by the default.
+    pub light_grid: u32,
     /// Seed of every random stream.
     pub seed: u64,
 }

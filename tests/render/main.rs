@@ -2,12 +2,16 @@
 
 #![expect(clippy::unwrap_used, reason = "a failed helper fails its test")]
 
+mod camera;
 mod caustics;
 mod determinism;
 mod direct_light;
 mod geometry;
 mod geometry_shapes;
 mod geometry_structures;
+mod light_sampling;
+mod lights;
+mod materials;
 mod optics;
 mod photon_map;
 mod picture;

@@ -59,7 +59,7 @@ fn a_scene_is_compiled_as_it_is_written() {
         panic!("a checkerboard: {:?}", scene.materials[0])
     };
     assert_eq!((colors[1].to_array(), *size), ([1.0, 1.0, 0.0], 0.5));
-    assert_eq!(scene.materials[2], Material::Glass { ior: 1.5 });
+    assert_eq!(scene.materials[2], Material::Glass { ior: 1.5, absorption: glam::Vec3::ZERO });
     assert_eq!(scene.objects[0].name, "ground");
     assert_eq!(scene.objects[1].material.index(), 2);
 }

@@ -1,33 +1,27 @@
 //! From the scene file to the compiled scene: names to ids, numbers to axes, and every check that
 //! needs more than one field.
 
+mod camera;
+mod emission;
 mod light;
+mod material;
 mod mesh;
 mod polygon;
 mod shape;
 
 use super::assets::AssetSource;
-use super::file::{
-    AlbedoFile, CameraFile, ImageFile, MaterialFile, ObjectFile, PerspectiveFile, RenderFile, SceneFile,
-    StopFile, read_scene_file,
-};
+use super::file::{ImageFile, MaterialFile, ObjectFile, RenderFile, SceneFile, StopFile, read_scene_file};
 use super::issue::{IssueCode, Issues, SceneErrors};
 use super::json::{ParseError, ParseErrorKind, parse};
 use super::shape_file::ShapeFile;
 use super::{
-    Camera, ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop,
-    Texture, Tone,
+    ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Tone,
 };
 use crate::geometry::GeometryBuilder;
-use glam::{DAffine3, DVec3, Vec2, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use mesh::MeshLoader;
 use shape::Originals;
 use std::collections::HashMap;
-
-/// Least sine of the angle between `up` and the view: below it the picture's horizon is rounding error.
-const MIN_UP_SINE: f64 = 1e-5;
-/// Bounds of the tangent of half the field of view within which a float still tells pixels apart.
-const TAN_HALF_FOV: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
 
 impl Scene {
     /// Reads and compiles a scene file; `assets` gives the meshes that it names.
@@ -104,42 +98,10 @@ struct Compiler<'f> {
 }
 
 impl<'f> Compiler<'f> {
-    fn camera(&mut self, camera: &CameraFile, image: ImageSettings) -> Option<Camera> {
-        let CameraFile::Perspective(PerspectiveFile { eye, target, up, fov }) = camera;
-        let (from, to) = (DVec3::from(*eye), DVec3::from(*target));
-        let view = to - from;
-        // What is left of the view after rounding the positions to floats.
-        let blur = f64::from(f32::EPSILON) * from.abs().max(to.abs()).max_element();
-        if view.length() <= 4.0 * blur {
-            let message = "the target must differ from the eye: there is no direction to look in";
-            self.issues.add("/camera/target", IssueCode::Degenerate, message);
-            return None;
-        }
-        if view.normalize().cross(DVec3::from(*up).normalize()).length() < MIN_UP_SINE {
-            let message = "`up` must not be parallel to the direction from eye to target";
-            self.issues.add("/camera/up", IssueCode::Degenerate, message);
-            return None;
-        }
-        let resolution = Vec2::new(image.width as f32, image.height as f32);
-        let camera = Camera::look_at(vec3(*eye), vec3(*target), vec3(*up), *fov as f32, resolution);
-        match camera {
-            Some(camera) if TAN_HALF_FOV.contains(&camera.tan_half_fov) => Some(camera),
-            Some(_) => {
-                let message = format!("a field of view of {fov} degrees is too close to 0 or 180");
-                self.issues.add("/camera/fov", IssueCode::OutOfRange, message);
-                None
-            }
-            None => {
-                self.issues.add("/camera", IssueCode::Degenerate, "eye, target and up span no picture");
-                None
-            }
-        }
-    }
-
     fn materials(&mut self, materials: &'f [(String, Option<MaterialFile>)]) {
         for (name, material) in materials {
-            if let Some(material) = material {
-                let id = self.add_material(compile_material(material));
+            if let Some(material) = material.as_ref().and_then(|m| self.material(name, m)) {
+                let id = self.add_material(material);
                 self.material_ids.insert(name, id);
             }
         }
@@ -159,6 +121,7 @@ impl<'f> Compiler<'f> {
             let name = object.name.clone().unwrap_or_else(|| format!("objects/{index}"));
             let id = self.add_object(Object { name, material, emitter: None });
             self.shape(id, &object.shape, index);
+            self.emission(id, object, index);
         }
     }
 
@@ -208,8 +171,8 @@ impl<'f> Compiler<'f> {
                 Stop { error: error.map(|e| e as f32), seconds: *seconds, rounds: *rounds }
             }
         };
-        let RenderFile { paths, radius, structure, seed, stop: _ } = *render;
-        Some(RenderSettings { paths, stop, radius, structure, seed })
+        let RenderFile { paths, radius, structure, light_sampling, light_grid, seed, stop: _ } = *render;
+        Some(RenderSettings { paths, stop, radius, structure, light_sampling, light_grid, seed })
     }
 }
 
@@ -219,21 +182,6 @@ fn image_settings(image: Option<&ImageFile>) -> ImageSettings {
             ImageSettings { width: *width, height: *height, exposure: *exposure as f32, tone: *tone }
         }
         None => ImageSettings { width: 640, height: 480, exposure: 0.0, tone: Tone::Linear },
-    }
-}
-
-fn compile_material(material: &MaterialFile) -> Material {
-    match material {
-        MaterialFile::Diffuse(diffuse) => Material::Diffuse {
-            albedo: match &diffuse.albedo {
-                AlbedoFile::Color(color) => Texture::Constant(vec3(*color)),
-                AlbedoFile::Checker(checker) => {
-                    Texture::Checker { colors: checker.colors.map(vec3), size: checker.size as f32 }
-                }
-            },
-        },
-        MaterialFile::Mirror(mirror) => Material::Mirror { reflectance: vec3(mirror.reflectance) },
-        MaterialFile::Glass(glass) => Material::Glass { ior: glass.ior as f32 },
     }
 }
 

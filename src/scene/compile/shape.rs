@@ -46,7 +46,7 @@ impl<'f> Originals<'f> {
 }
 
 /// The outlines of a box's six sides, seen from outside.
-fn sides(file: &BoxFile) -> [[DVec3; 4]; 6] {
+pub(super) fn sides(file: &BoxFile) -> [[DVec3; 4]; 6] {
     let (center, half) = (DVec3::from(file.center), DVec3::from(file.size) * 0.5);
     std::array::from_fn(|side| {
         let (axis, sign) = (side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });

@@ -281,6 +281,13 @@ impl Color {
     }
 }
 
+impl Color {
+    /// Up to `max` per channel.
+    pub(in crate::scene) fn up_to(self, max: f64) -> Self {
+        Self { max, ..self }
+    }
+}
+
 impl Decode for Color {
     type Out = [f64; 3];
 

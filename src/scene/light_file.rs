@@ -1,0 +1,96 @@
+//! The lights of the scene file: exactly what the JSON says, nothing computed.
+
+use super::read::{color, direction, optional, point, real, record, required, size2, tagged};
+
+tagged! {
+    /// A light.
+    LightFile {
+        "point" => Point(PointLightFile),
+        "spot" => Spot(SpotLightFile),
+        "directional" => Directional(DirectionalLightFile),
+        "quad" => Quad(QuadLightFile),
+        "disk" => Disk(DiskLightFile),
+        "sphere" => Sphere(SphereLightFile),
+    }
+}
+
+record! {
+    /// A light that is a point.
+    PointLightFile {
+        /// Where it is.
+        position: [f64; 3] = required(point()),
+        /// Radiant intensity, W·sr⁻¹.
+        intensity: [f64; 3] = required(color("intensity")),
+    }
+}
+
+record! {
+    /// A point whose light is confined to a cone. With s = (cos θ - cos outer/2) / (cos inner/2 - cos outer/2),
+    /// limited to 0..1, the intensity at an angle θ from the axis is s² (3 - 2s) times that on the axis.
+    SpotLightFile {
+        /// Where it is.
+        position: [f64; 3] = required(point()),
+        /// Direction of the axis; either this or `towards`.
+        direction: Option<[f64; 3]> = optional(direction()),
+        /// A point on the axis; either this or `direction`.
+        towards: Option<[f64; 3]> = optional(point()),
+        /// Radiant intensity on the axis, W·sr⁻¹.
+        intensity: [f64; 3] = required(color("intensity")),
+        /// Opening angle of the cone beyond which there is no light, from side to side, in degrees.
+        outer: f64 = required(real("opening angle in degrees").above(0.0).at_most(180.0)),
+        /// Opening angle of the cone within which the light is full, in degrees; 0.8 of `outer` if left out.
+        inner: Option<f64> = optional(real("opening angle in degrees").between(0.0, 180.0)),
+    }
+}
+
+record! {
+    /// Parallel light.
+    DirectionalLightFile {
+        /// The direction in which the light travels.
+        direction: [f64; 3] = required(direction()),
+        /// Irradiance on a surface that faces the light, W·m⁻².
+        irradiance: [f64; 3] = required(color("irradiance")),
+    }
+}
+
+record! {
+    /// A rectangle that emits to one side.
+    QuadLightFile {
+        /// Centre.
+        center: [f64; 3] = required(point()),
+        /// Width and height.
+        size: [f64; 2] = required(size2()),
+        /// A point the light faces.
+        towards: [f64; 3] = required(point()),
+        /// Direction of the width; horizontal if left out.
+        edge: Option<[f64; 3]> = optional(direction()),
+        /// Radiance, W·sr⁻¹·m⁻².
+        radiance: [f64; 3] = required(color("radiance")),
+    }
+}
+
+record! {
+    /// A disk that emits to one side.
+    DiskLightFile {
+        /// Centre.
+        center: [f64; 3] = required(point()),
+        /// Radius in metres.
+        radius: f64 = required(real("radius in metres").positive_length()),
+        /// A point the light faces.
+        towards: [f64; 3] = required(point()),
+        /// Radiance, W·sr⁻¹·m⁻².
+        radiance: [f64; 3] = required(color("radiance")),
+    }
+}
+
+record! {
+    /// A sphere that emits outwards.
+    SphereLightFile {
+        /// Centre.
+        center: [f64; 3] = required(point()),
+        /// Radius in metres.
+        radius: f64 = required(real("radius in metres").positive_length()),
+        /// Radiance, W·sr⁻¹·m⁻².
+        radiance: [f64; 3] = required(color("radiance")),
+    }
+}
