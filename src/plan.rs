@@ -256,7 +256,8 @@ impl Plan {
         let pixels = u64::from(width) * u64::from(height);
         let film = Film::bytes(width, height);
         // A round and its tiles, while it is made, or the ladder of widths, while it is smoothed.
-        let passing = if self.photons.is_empty() { 2 * film } else { (2 * film).max(pixels * SMOOTHING_BYTES) };
+        let passing =
+            if self.photons.is_empty() { 2 * film } else { (2 * film).max(pixels * SMOOTHING_BYTES) };
         let footprints = if self.photons.is_empty() { 0 } else { pixels * Footprints::BYTES_PER_PIXEL };
         scene.geometry.memory_bytes() + film + footprints + passing + photons * per_photon
     }
