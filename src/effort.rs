@@ -68,7 +68,7 @@ impl Effort {
         let per_block = photons as f32 * measured.photon_weight / (measured.rays_per_block * PHOTON_OVERHEAD);
         if measured.rays_per_block <= 0.0 || per_block <= 0.0 {
             let scale = if mean > 0.0 { SAMPLES_ALONE / mean } else { 0.0 };
-            return Self { photon_shift: 0, samples: samples(&wanted, scale, key) };
+            return Self { photon_shift: 0, samples: samples(&wanted, measured.samples, scale, key) };
         }
         // In the same unit: blocks wanted.
         let blocks = per_block.sqrt();
@@ -76,7 +76,7 @@ impl Effort {
         let balanced = if mean > 0.0 { (blocks / mean).log2().round() } else { most_shift };
         let photon_shift = balanced.clamp(0.0, most_shift) as u32;
         let scale = (1_u32 << photon_shift) as f32 / blocks;
-        Self { photon_shift, samples: samples(&wanted, scale, key) }
+        Self { photon_shift, samples: samples(&wanted, measured.samples, scale, key) }
     }
 }
 
@@ -97,11 +97,13 @@ fn wanted_samples(measured: &Measured<'_>) -> Vec<f32> {
     (0..per_sample.len()).map(|i| (around(i) / measured.rays_per_sample.max(1.0)).sqrt()).collect()
 }
 
-/// Fractions of a sample are rounded up as often as they are large.
-fn samples(wanted: &[f32], scale: f32, key: u64) -> Vec<u8> {
-    let round = |(i, w): (usize, &f32)| {
+/// Samples of each pixel: not more than twice what it had, so that a few do not decide on many. Fractions of a
+/// sample are rounded up as often as they are large.
+fn samples(wanted: &[f32], had: &[u32], scale: f32, key: u64) -> Vec<u8> {
+    let round = |(i, (w, &had)): (usize, (&f32, &u32))| {
         let dither = (hash(key, i as u64) >> 40) as f32 / (1_u64 << 24) as f32;
-        ((w * scale).clamp(LEAST_SAMPLES, MOST_SAMPLES) + dither).floor() as u8
+        let most = MOST_SAMPLES.min(2.0 * had.max(1) as f32);
+        ((w * scale).clamp(LEAST_SAMPLES, most) + dither).floor() as u8
     };
-    wanted.iter().enumerate().map(round).collect()
+    wanted.iter().zip(had).enumerate().map(round).collect()
 }

@@ -252,7 +252,9 @@ impl Render {
             rays_per_sample: (self.eye.eye_rays + self.eye.shadow_rays) as f32 / sampled.max(1) as f32,
         };
         let key = hash(self.scene.render.seed, u64::from(self.rounds()));
-        self.effort = Effort::decide(&measured, self.plan.most_photon_shift(), key);
+        // A round at most doubles what was done before: no single one overruns a limit of time by far.
+        let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);
+        self.effort = Effort::decide(&measured, most_shift, key);
         self.error = picture.error_estimate();
         self.preview = picture.image();
         self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));

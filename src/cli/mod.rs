@@ -56,7 +56,7 @@ pub(crate) enum Failure {
     #[error("{0}")]
     Usage(String),
     /// Stopped by a signal; finished rounds were written.
-    #[error("cancelled after {rounds} rounds")]
+    #[error("cancelled; rounds finished: {rounds}")]
     Cancelled {
         /// Rounds that are in the picture.
         rounds: u32,
