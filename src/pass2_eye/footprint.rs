@@ -29,7 +29,7 @@ pub struct Footprint {
     pub normal: Vec3,
     /// The sheet of surface.
     pub sheet: SheetId,
-    /// Sheet and way there; see [`view_code`].
+    /// Names the sheet and the way there.
     pub view: u32,
     /// Area, m².
     pub area: f32,
