@@ -128,7 +128,11 @@ impl PixelSums {
     pub(crate) fn not_finite(&self) -> Option<PathClass> {
         PathClass::ALL
             .into_iter()
-            .find(|&c| self.halves.iter().any(|h| !(h.classes.get(c) + h.irradiance).is_finite()))
+            .find(|&c| self.halves.iter().any(|h| !h.classes.get(c).is_finite()))
+            .or_else(|| {
+                let counted = self.gain + self.halves[0].irradiance + self.halves[1].irradiance;
+                (!counted.is_finite()).then_some(PathClass::Caustic)
+            })
     }
 }
 

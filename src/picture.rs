@@ -67,9 +67,7 @@ impl<'a> Picture<'a> {
         if self.film.rounds() == 0 {
             return None;
         }
-        let errors = self.errors();
-        let sum: f64 = errors.iter().map(|e| f64::from(e.sampled + e.photons)).sum();
-        Some((sum / errors.len() as f64).sqrt() as f32)
+        Some(PixelError::root_mean(&self.errors()))
     }
 
     /// Estimated relative squared error of every pixel, by what makes it.
@@ -109,6 +107,15 @@ pub struct PixelError {
     pub sampled: f32,
     /// Of what photons bring.
     pub photons: f32,
+}
+
+impl PixelError {
+    /// Root of the mean over pixels.
+    #[must_use]
+    pub fn root_mean(errors: &[Self]) -> f32 {
+        let sum: f64 = errors.iter().map(|e| f64::from(e.sampled + e.photons)).sum();
+        (sum / errors.len().max(1) as f64).sqrt() as f32
+    }
 }
 
 fn mean_channel(v: Vec3) -> f32 {

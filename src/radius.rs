@@ -3,11 +3,13 @@
 /// How the radius depends on the round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum RadiusRule {
-    /// About a pixel, the same in every round: blurs no more than the pixel does.
+    /// Photons are counted on each pixel's own footprint and smoothed as wide as their halves advise; where a
+    /// pixel has no footprint, a kernel of about a pixel, the same in every round.
     #[default]
     Pixel,
-    /// Wide at first and shrinking from round to round, so that noise and blur both vanish in the limit
-    /// (Knaus and Zwicker 2011, α = 2/3): the classic progressive photon map, for comparison.
+    /// A kernel around random points of the pixel, wide at first and shrinking from round to round, so that noise
+    /// and blur both vanish in the limit (Knaus and Zwicker 2011, α = 2/3); nothing is smoothed: the classic
+    /// progressive photon map, for comparison.
     Progressive,
 }
 

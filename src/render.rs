@@ -6,8 +6,9 @@ use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::pass1_light::{self, Blocks, Tally};
 use crate::pass2_eye::{self, EyeContext, EyeCounts, Footprints};
-use crate::picture::Picture;
+use crate::picture::{Picture, PixelError};
 use crate::plan::Plan;
+use crate::radius::RadiusRule;
 use crate::sampling::hash;
 use crate::scene::Scene;
 use crate::smooth::Smoothing;
@@ -122,8 +123,8 @@ pub struct RenderStats {
     pub eye: EyeCounts,
 }
 
-/// A render in progress. Rounds are pure functions of scene, plan and number; they are the time slice in
-/// which renders share a machine.
+/// A render in progress. A round is a function of scene, plan, number and the effort decided at the last
+/// milestone; rounds are the time slice in which renders share a machine.
 pub struct Render {
     scene: Arc<Scene>,
     plan: Plan,
@@ -132,7 +133,7 @@ pub struct Render {
     pass2: PassTime,
     windows: Vec<Tally>,
     eye: EyeCounts,
-    /// Traced before the first round that has photons.
+    /// Traced before the first round, if there are photons to count on them.
     footprints: Footprints,
     /// The picture at the last milestone.
     preview: LinearImage,
@@ -193,9 +194,7 @@ impl Render {
         let round = self.film.rounds();
         let start = Stopwatch::start();
         let blocks = self.next_blocks();
-        if !self.plan.photons.is_empty() && self.footprints.size().0 == 0 {
-            self.footprints = Footprints::trace(&self.scene);
-        }
+        self.trace_footprints();
         let photons = if self.plan.photons.is_empty() {
             None
         } else {
@@ -224,6 +223,15 @@ impl Render {
         self.at_milestone();
         self.pass2.add(&start);
         Ok(RoundReport { rounds: self.rounds(), error: self.error_estimate(), seconds: self.seconds() })
+    }
+
+    /// Traces the pixels' footprints once, if photons are counted on them. A progressive radius is the classic
+    /// method instead: photons are looked up point by point, and nothing is smoothed.
+    fn trace_footprints(&mut self) {
+        let counted = !self.plan.photons.is_empty() && self.plan.radius == RadiusRule::Pixel;
+        if counted && self.footprints.size().0 == 0 {
+            self.footprints = Footprints::trace(&self.scene);
+        }
     }
 
     /// The blocks of the next round: aligned, so that each is a net of its own.
@@ -255,7 +263,7 @@ impl Render {
         // A round at most doubles what was done before: no single one overruns a limit of time by far.
         let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);
         self.effort = Effort::decide(&measured, most_shift, key);
-        self.error = picture.error_estimate();
+        self.error = Some(PixelError::root_mean(&errors));
         self.preview = picture.image();
         self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));
     }

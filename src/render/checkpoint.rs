@@ -58,6 +58,8 @@ impl Render {
         let rest = checkpoint.strip_prefix(MAGIC.as_slice()).ok_or(CheckpointError::Unknown)?;
         let mut render = Self::new(scene, plan);
         render.read(rest).ok_or(CheckpointError::Mismatch)?;
+        // The picture may be asked for before another round, if this was the last.
+        render.trace_footprints();
         Ok(render)
     }
 

@@ -222,8 +222,7 @@ fn running_sum(plane: &mut [Vec3], line: &mut [Vec3], half: usize, at: impl Fn(u
     for (k, value) in line.iter_mut().enumerate() {
         *value = plane[at(k)];
     }
-    // Sums are formed anew for each pixel of narrow boxes and carried on in f64 for all, so that no rounding
-    // is left behind by bright pixels.
+    // Carried on in f64: what a bright pixel leaves behind when it is taken away is far below f32's rounding.
     let mut sum = line[..half.min(n)].iter().map(|v| v.as_dvec3()).sum::<glam::DVec3>();
     for k in 0..n {
         if k + half < n {

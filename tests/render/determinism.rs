@@ -73,6 +73,22 @@ fn a_resumed_render_gives_the_same_bytes_as_an_undisturbed_one() {
     assert_eq!(resumed.stats().windows, undisturbed.stats().windows);
 }
 
+/// A crash between the last round and its picture: the picture is made of the checkpoint alone.
+#[test]
+fn a_picture_of_a_checkpoint_is_the_picture_without_one() {
+    for rounds in 1..=5 {
+        let mut render = new_render();
+        for _ in 0..rounds {
+            render.run_round(&Control::new()).unwrap();
+        }
+        let scene = compile(&value());
+        let plan = Plan::new(&scene);
+        let resumed = Render::resume(Arc::new(scene), plan, &render.checkpoint()).unwrap();
+        assert!(bits(&resumed) == bits(&render), "{rounds} rounds");
+        assert_eq!(resumed.error_estimate(), render.error_estimate());
+    }
+}
+
 #[test]
 fn a_checkpoint_that_does_not_fit_is_refused() {
     let mut render = new_render();

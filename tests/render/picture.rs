@@ -95,6 +95,24 @@ fn smooth_light_is_smoothed() {
     assert!(after < before / 3.0, "{after} {before}");
 }
 
+/// The classic progressive estimate, to compare with: right in the mean, and not smoothed.
+#[test]
+fn the_progressive_radius_is_right_in_the_mean_and_not_smoothed() {
+    let (width, pixels) = (0.2, 24);
+    let mut value = mirrored_light(width, pixels);
+    value["render"]["radius"] = json!("progressive");
+    let truth = truth(width, pixels as usize);
+    let count = (pixels * pixels) as usize;
+    let expected = (0..count).map(&truth).sum::<f64>() / count as f64;
+    let estimate = crate::support::over_seeds(|seed| {
+        let render = render(&value, seed, 1, 17);
+        assert_eq!(render.layer(PathClass::Caustic), render.raw_layer(PathClass::Caustic));
+        crate::support::mean(&render.layer(PathClass::Caustic))
+    });
+    // The kernel of four pixels sees the light's curvature over 3 cm.
+    estimate.assert_is(expected, 2e-3);
+}
+
 /// The mirror's outline projects to a sharp edge, z = 2 - x: three pixels from it the light is whole on one side
 /// and nothing on the other.
 #[test]
