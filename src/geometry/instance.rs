@@ -61,6 +61,7 @@ impl Instance {
         Ray {
             origin: self.to_mesh.transform_point3(ray.origin.as_dvec3()).as_vec3(),
             direction: self.to_mesh.transform_vector3(ray.direction.as_dvec3()).as_vec3(),
+            time: ray.time,
         }
     }
 

@@ -2,21 +2,38 @@
 
 use glam::Vec3;
 
-/// A ray from `origin` along the unit vector `direction`.
+/// A ray from `origin` along the unit vector `direction`, at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Where it starts.
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
+    /// When it travels, from 0 where the shutter opens to 1 where it closes: light takes no time on its way, so
+    /// that all rays of a path have the same.
+    pub time: f32,
 }
 
 impl Ray {
-    /// A ray from `origin` along the unit vector `direction`.
+    /// A ray from `origin` along the unit vector `direction`, when the shutter opens.
     #[inline]
     #[must_use]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin, direction }
+        Self { origin, direction, time: 0.0 }
+    }
+
+    /// The same ray at another moment.
+    #[inline]
+    #[must_use]
+    pub fn at_time(self, time: f32) -> Self {
+        Self { time, ..self }
+    }
+
+    /// The next ray of the same path: it keeps the time.
+    #[inline]
+    #[must_use]
+    pub fn continue_from(&self, origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, direction, time: self.time }
     }
 
     /// The point at distance `t`.
@@ -60,6 +77,13 @@ fn away(point: f32, moved: f32, side: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_ray_that_continues_another_keeps_its_time() {
+        let ray = Ray::new(Vec3::ZERO, Vec3::X).at_time(0.25);
+        let next = ray.continue_from(Vec3::X, Vec3::Y);
+        assert_eq!(next, Ray { origin: Vec3::X, direction: Vec3::Y, time: 0.25 });
+    }
 
     #[test]
     fn an_offset_point_lies_strictly_on_the_side_of_the_ray_at_every_scale() {

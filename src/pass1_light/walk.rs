@@ -84,7 +84,7 @@ pub(super) fn walk(
         let origin =
             offset_origin(hit.surface.point, hit.surface.error, hit.surface.normal, outcome.direction);
         absorption = optics::absorption_after(material, &outcome, &hit.surface, came_through);
-        ray = Ray::new(origin, outcome.direction);
+        ray = ray.continue_from(origin, outcome.direction);
     }
     tally.cut += 1;
     tally.energy.cut += power.as_dvec3();

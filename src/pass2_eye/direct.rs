@@ -21,6 +21,8 @@ pub(super) struct Receiver<'a> {
     pub(super) normal: Vec3,
     /// Absorption coefficient of the medium on that side.
     pub(super) absorption: Vec3,
+    /// When it is seen: the shadow rays' time.
+    pub(super) time: f32,
 }
 
 /// A direction from which light may come.
@@ -79,7 +81,8 @@ fn visible(scene: &Scene, receiver: &Receiver<'_>, incident: Option<Incident>, r
     let surface = receiver.surface;
     let origin = offset_origin(surface.point, surface.error, receiver.normal, incident.direction);
     *rays += 1;
-    if scene.geometry.any_hit(&Ray::new(origin, incident.direction), incident.distance) {
+    let shadow_ray = Ray::new(origin, incident.direction).at_time(receiver.time);
+    if scene.geometry.any_hit(&shadow_ray, incident.distance) {
         return Vec3::ZERO;
     }
     // Nothing was met on the way, so that the light is in the same medium.

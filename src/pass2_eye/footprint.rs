@@ -169,7 +169,7 @@ fn land(scene: &Scene, raster: Vec2) -> Option<Landing> {
         key = outcome.extend_key(key);
         let surface = &hit.surface;
         let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
-        ray = Ray::new(origin, outcome.direction);
+        ray = ray.continue_from(origin, outcome.direction);
     }
     None
 }

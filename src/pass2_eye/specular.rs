@@ -203,7 +203,7 @@ impl<'a> EyeWalk<'a> {
         let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
         let material = self.context.scene.material_of(hit.object);
         self.stack.push(Branch {
-            ray: Ray::new(origin, outcome.direction),
+            ray: branch.ray.continue_from(origin, outcome.direction),
             throughput,
             absorption: optics::absorption_after(material, outcome, surface, branch.absorption),
             bounces: branch.bounces + 1,
@@ -230,7 +230,8 @@ impl<'a> EyeWalk<'a> {
         // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
         let weight = branch.throughput * albedo / std::f32::consts::PI;
         let normal = if backside { -hit.surface.normal } else { hit.surface.normal };
-        let receiver = Receiver { surface: &hit.surface, normal, absorption: branch.absorption };
+        let receiver =
+            Receiver { surface: &hit.surface, normal, absorption: branch.absorption, time: branch.ray.time };
         let sample = self.sample.branch(branch.key);
         let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
         sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);
