@@ -114,7 +114,7 @@ impl PixelSums {
             let mut means = half.classes;
             for class in PathClass::ALL {
                 means.0[class as usize] *= match class {
-                    PathClass::Emitted | PathClass::Direct => per_sample,
+                    PathClass::Emitted | PathClass::Direct | PathClass::Indirect => per_sample,
                     PathClass::Caustic => per_photon,
                 };
             }

@@ -53,6 +53,7 @@
 //! [`pass2_eye`] `…E` · [`film`] layers and their error · [`develop`], [`image_io`] pictures · [`compare`]
 //! how two differ · [`report`] plans and statistics as JSON.
 
+pub mod bsdf;
 pub mod compare;
 pub mod develop;
 pub mod effort;
@@ -60,6 +61,7 @@ pub mod film;
 pub mod geometry;
 pub mod image_io;
 pub mod light_path;
+pub mod media;
 pub mod optics;
 pub mod pass1_light;
 pub mod pass2_eye;
@@ -72,3 +74,4 @@ pub mod report;
 pub mod sampling;
 pub mod scene;
 pub mod smooth;
+pub mod spectrum;

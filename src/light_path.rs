@@ -18,11 +18,13 @@ pub enum PathClass {
     Direct,
     /// `LS+DS*E`: light that mirrors or glass throw onto the first D the eye sees.
     Caustic,
+    /// `L(D|S)*DS*DS*E`: light that has met another D before.
+    Indirect,
 }
 
 impl PathClass {
-    /// All classes that are rendered, in the order of the film's layers.
-    pub const ALL: [Self; 3] = [Self::Emitted, Self::Direct, Self::Caustic];
+    /// All classes, in the order of the film's layers.
+    pub const ALL: [Self; 4] = [Self::Emitted, Self::Direct, Self::Caustic, Self::Indirect];
 
     /// The class's name on the wire and in file names.
     #[must_use]
@@ -31,6 +33,7 @@ impl PathClass {
             Self::Emitted => "emitted",
             Self::Direct => "direct",
             Self::Caustic => "caustic",
+            Self::Indirect => "indirect",
         }
     }
 
@@ -41,19 +44,26 @@ impl PathClass {
             Self::Emitted => "LS*E",
             Self::Direct => "LDS*E",
             Self::Caustic => "LS+DS*E",
+            Self::Indirect => "L(D|S)*DS*DS*E",
         }
     }
 
-    /// The class of a path whose vertices after the light are `bounces`, in the order light travels;
-    /// `None` for the paths with more than one D, which are not rendered.
+    /// The class of a path that comes straight from the light to a D which is the eye's `count`-th.
+    #[inline]
     #[must_use]
-    pub fn of(bounces: &[Bounce]) -> Option<Self> {
+    pub(crate) fn with_light_after(count: u32) -> Self {
+        if count == 1 { Self::Direct } else { Self::Indirect }
+    }
+
+    /// The class of a path whose vertices after the light are `bounces`, in the order light travels.
+    #[must_use]
+    pub fn of(bounces: &[Bounce]) -> Self {
         let mut diffuse = (0..bounces.len()).filter(|&i| bounces[i] == Bounce::Diffuse);
         match (diffuse.next(), diffuse.next()) {
-            (None, _) => Some(Self::Emitted),
-            (Some(0), None) => Some(Self::Direct),
-            (Some(_), None) => Some(Self::Caustic),
-            (Some(_), Some(_)) => None,
+            (None, _) => Self::Emitted,
+            (Some(0), None) => Self::Direct,
+            (Some(_), None) => Self::Caustic,
+            (Some(_), Some(_)) => Self::Indirect,
         }
     }
 }

@@ -1,7 +1,13 @@
 //! S: what mirrors, smooth metal and glass do to a ray, in either direction of travel.
 
-use crate::geometry::SurfacePoint;
-use crate::scene::{Conductor, Material};
+mod fresnel;
+
+pub use fresnel::{fresnel, fresnel_conductor, metal_reflectance, reflect, refract, transmittance};
+
+use crate::geometry::{Hit, SurfacePoint};
+use crate::media::{Interface, Media};
+use crate::scene::{Material, Scene};
+use crate::spectrum::Line;
 use glam::Vec3;
 
 /// Which way a ray leaves a specular surface.
@@ -28,6 +34,10 @@ pub struct Outcome {
     /// Factor on the flux of a photon that travels forward over interpolated normals, whose projected areas
     /// do not cancel (Veach 1997, 5.3); 1 where the shading normal is the geometric one.
     pub flux_scale: f32,
+    /// What the ray is inside of from here.
+    pub media: Media,
+    /// Its wavelength from here, μm, if it has one; the weight for its choice is in `fraction`.
+    pub wavelength: Option<f32>,
 }
 
 impl Outcome {
@@ -39,8 +49,8 @@ impl Outcome {
     }
 }
 
-/// All ways a ray can leave a specular surface; what is missing of their fractions is absorbed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// All ways a ray can leave a surface's S part; what is missing of their fractions is absorbed, or the D part's.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Interaction {
     /// Reflected part.
     pub reflected: Option<Outcome>,
@@ -48,166 +58,213 @@ pub struct Interaction {
     pub refracted: Option<Outcome>,
 }
 
-/// Mirrors the travelling direction at a surface: `I - 2 (N·I) N`, for either sign of the normal.
-#[inline]
-#[must_use]
-pub fn reflect(direction: Vec3, normal: Vec3) -> Vec3 {
-    direction - normal * (2.0 * normal.dot(direction))
+/// A ray that arrives at a surface.
+#[derive(Clone, Copy)]
+pub struct Arrival<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Where it arrives.
+    pub hit: &'a Hit,
+    /// Unit direction in which it travels.
+    pub direction: Vec3,
+    /// What it has come through.
+    pub media: Media,
+    /// Its wavelength, μm; `None` is light of all wavelengths.
+    pub wavelength: Option<f32>,
 }
 
-/// Refracts the travelling direction by Snell's law; `normal` is on the side the ray comes from and `eta` is
-/// n_i/n_t. `None` in total internal reflection.
-#[inline]
-#[must_use]
-pub fn refract(direction: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
-    let cos_i = -normal.dot(direction);
-    let sin2_t = eta * eta * (1.0 - cos_i * cos_i).max(0.0);
-    if sin2_t >= 1.0 {
-        return None;
-    }
-    let cos_t = (1.0 - sin2_t).sqrt();
-    Some((direction * eta + normal * (eta * cos_i - cos_t)).normalize())
-}
-
-/// Unpolarised Fresnel reflectance of a smooth dielectric; `cos_i` is the cosine on the side of incidence,
-/// `eta` is n_i/n_t. 1 in total internal reflection, 0 where the indices are equal.
-#[inline]
-#[must_use]
-pub fn fresnel(cos_i: f32, eta: f32) -> f32 {
-    if eta == 1.0 {
-        return 0.0;
-    }
-    let cos_i = cos_i.clamp(0.0, 1.0);
-    let sin2_t = eta * eta * (1.0 - cos_i * cos_i);
-    if sin2_t >= 1.0 {
-        return 1.0;
-    }
-    let cos_t = (1.0 - sin2_t).sqrt();
-    let s = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    let p = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    0.5 * (s * s + p * p)
-}
-
-/// Unpolarised Fresnel reflectance of a conductor of complex index `n` + i`k` in air, one channel.
-#[must_use]
-pub fn fresnel_conductor(cos_i: f32, n: f32, k: f32) -> f32 {
-    if cos_i <= 0.0 {
-        return 1.0;
-    }
-    let cos2 = cos_i.min(1.0) * cos_i.min(1.0);
-    let sin2 = 1.0 - cos2;
-    let (n2, k2) = (n * n, k * k);
-    let t = n2 - k2 - sin2;
-    // (a + ib)² = (n + ik)² - sin².
-    let length = (t * t + 4.0 * n2 * k2).sqrt();
-    let a = (0.5 * (length + t)).max(0.0).sqrt();
-    let cross = 2.0 * a * cos_i.min(1.0);
-    let s = (length + cos2 - cross) / (length + cos2 + cross);
-    let (sum, mixed) = (cos2 * length + sin2 * sin2, cross * sin2);
-    let p = s * (sum - mixed) / (sum + mixed);
-    0.5 * (s + p)
-}
-
-/// Reflectance of a metal per channel.
-#[must_use]
-pub fn metal_reflectance(cos_i: f32, conductor: &Conductor) -> Vec3 {
-    match conductor {
-        Conductor::Normal(f0) => {
-            let m = 1.0 - cos_i.clamp(0.0, 1.0);
-            *f0 + (Vec3::ONE - *f0) * (m * m * m * m * m)
+impl<'a> Arrival<'a> {
+    /// Corrects what the ray is known to have come through by the side on which it arrives.
+    #[must_use]
+    pub fn new(
+        scene: &'a Scene,
+        hit: &'a Hit,
+        direction: Vec3,
+        known: &Media,
+        wavelength: Option<f32>,
+    ) -> Self {
+        let mut arrival = Self { scene, hit, direction, media: *known, wavelength };
+        if arrival.material().dielectric().is_some() {
+            arrival.media = known.arriving(scene.objects[hit.object.index()].material, arrival.leaves());
         }
-        Conductor::Complex { n, k } => {
-            let channel = |i: usize| fresnel_conductor(cos_i, n[i], k[i]);
-            Vec3::new(channel(0), channel(1), channel(2))
+        arrival
+    }
+
+    /// What the surface is made of.
+    #[inline]
+    #[must_use]
+    pub fn material(&self) -> &'a Material {
+        self.scene.material_of(self.hit.object)
+    }
+
+    fn leaves(&self) -> bool {
+        self.direction.dot(self.hit.surface.normal) > 0.0
+    }
+
+    /// What the surface's S part does to the ray. `line` picks a wavelength where light of all is taken apart.
+    #[must_use]
+    pub fn interact(&self, line: impl Fn() -> Line) -> Interaction {
+        let material = self.material();
+        let mut interaction = self.part(material, &line);
+        for outcome in [&mut interaction.reflected, &mut interaction.refracted].into_iter().flatten() {
+            outcome.wavelength = outcome.wavelength.or(self.wavelength);
+        }
+        interaction
+    }
+
+    fn part(&self, material: &Material, line: &impl Fn() -> Line) -> Interaction {
+        match material {
+            Material::Diffuse { .. } => Interaction::default(),
+            Material::Mirror { reflectance } => self.mirror(*reflectance),
+            Material::Metal { alpha: Some(_), .. } => Interaction::default(),
+            Material::Metal { conductor, alpha: None } => {
+                let cos_i = -Frame::new(self.direction, &self.hit.surface).shading.dot(self.direction);
+                self.mirror(metal_reflectance(cos_i, conductor))
+            }
+            Material::Glass { alpha, .. } => self.glass(alpha.is_some(), line),
+            Material::Phong(phong) => self.lecture(phong.k_r, phong.k_t, line),
+            Material::Mix(mix) => {
+                let [a, b] = mix.shares(self.hit.surface.uv);
+                self.part(a.0, line).times(a.1).and(self.part(b.0, line).times(b.1))
+            }
         }
     }
-}
 
-/// What a surface does to a ray if it is an S, `None` if it is a D.
-#[must_use]
-pub fn interact(material: &Material, direction: Vec3, surface: &SurfacePoint) -> Option<Interaction> {
-    match material {
-        Material::Diffuse { .. } => None,
-        Material::Mirror { reflectance } => Some(mirror(direction, surface, *reflectance)),
-        Material::Metal(conductor) => {
-            let cos_i = -Frame::new(direction, surface).shading.dot(direction);
-            Some(mirror(direction, surface, metal_reflectance(cos_i, conductor)))
+    fn mirror(&self, reflectance: Vec3) -> Interaction {
+        let frame = Frame::new(self.direction, &self.hit.surface);
+        let outcome = frame.reflected(self.direction, reflectance);
+        Interaction { reflected: Some(Outcome { media: self.media, ..outcome }), refracted: None }
+    }
+
+    /// Fresnel's shares; of a rough surface only what something of a higher priority hides, which is passed.
+    fn glass(&self, rough: bool, line: &impl Fn() -> Line) -> Interaction {
+        let crossing = self.crossing(line);
+        if crossing.hidden || !rough { crossing.by_fresnel(self) } else { Interaction::default() }
+    }
+
+    /// The lecture's k_r and k_t, which do not depend on the angle.
+    fn lecture(&self, k_r: Vec3, k_t: Vec3, line: &impl Fn() -> Line) -> Interaction {
+        if k_t == Vec3::ZERO {
+            return if k_r == Vec3::ZERO { Interaction::default() } else { self.mirror(k_r) };
         }
-        Material::Glass { ior, .. } => Some(glass(direction, surface, *ior)),
+        let crossing = self.crossing(line);
+        if crossing.hidden {
+            return crossing.by_fresnel(self);
+        }
+        match crossing.refracted(self, &Frame::new(self.direction, &self.hit.surface)) {
+            Some(through) => {
+                let refracted = Outcome { fraction: k_t * through.fraction, ..through };
+                let reflected = (k_r != Vec3::ZERO).then(|| self.mirror(k_r).reflected).flatten();
+                Interaction { reflected, refracted: Some(refracted) }
+            }
+            None => self.mirror(k_r + k_t),
+        }
+    }
+
+    /// The surface as one between two media, for light of a wavelength in μm.
+    #[must_use]
+    pub fn interface(&self, wavelength: Option<f32>) -> Interface {
+        let material = self.scene.objects[self.hit.object.index()].material;
+        self.media.interface(self.scene, material, self.leaves(), wavelength)
+    }
+
+    fn crossing(&self, line: &impl Fn() -> Line) -> Crossing {
+        let known = self.interface(self.wavelength);
+        let line = (known.dispersive && !known.hidden && self.wavelength.is_none()).then(line);
+        let eta = line.map_or(known.eta, |line| self.interface(Some(line.wavelength)).eta);
+        Crossing { after: known.after, hidden: known.hidden, mean_eta: known.eta, eta, line }
     }
 }
 
-/// Absorption coefficient of what a ray has come through: of the surface's own glass if it arrives from within,
-/// else what was known of its way.
-#[inline]
-#[must_use]
-pub fn absorption_before(material: &Material, direction: Vec3, surface: &SurfacePoint, known: Vec3) -> Vec3 {
-    match material {
-        Material::Glass { absorption, .. } if direction.dot(surface.normal) > 0.0 => *absorption,
-        Material::Glass { .. } | Material::Diffuse { .. } | Material::Mirror { .. } | Material::Metal(_) => {
-            known
+/// The surface between two media, for one ray.
+struct Crossing {
+    after: Media,
+    hidden: bool,
+    /// n_i/n_t for the share that is reflected, which is not taken apart.
+    mean_eta: f32,
+    /// n_i/n_t for the direction of what is refracted.
+    eta: f32,
+    /// The wavelength that was picked, if light was taken apart.
+    line: Option<Line>,
+}
+
+impl Crossing {
+    /// Smooth glass; a hidden surface lets all through.
+    fn by_fresnel(&self, arrival: &Arrival<'_>) -> Interaction {
+        if self.hidden {
+            let straight = Outcome::through(arrival.direction);
+            return Interaction {
+                reflected: None,
+                refracted: Some(Outcome { media: self.after, ..straight }),
+            };
         }
+        let frame = Frame::new(arrival.direction, &arrival.hit.surface);
+        let reflectance = fresnel(-frame.shading.dot(arrival.direction), self.mean_eta);
+        let refracted = self.refracted(arrival, &frame).map(|mut outcome| {
+            outcome.fraction *= 1.0 - reflectance;
+            outcome
+        });
+        let reflectance = if refracted.is_none() { 1.0 } else { reflectance };
+        let reflected = (reflectance > 0.0).then(|| {
+            let outcome = frame.reflected(arrival.direction, Vec3::splat(reflectance));
+            Outcome { media: arrival.media, ..outcome }
+        });
+        Interaction { reflected, refracted }
+    }
+
+    /// All of the light, let through; `None` in total internal reflection.
+    fn refracted(&self, arrival: &Arrival<'_>, frame: &Frame) -> Option<Outcome> {
+        let outcome = frame.refracted(arrival.direction, self.eta)?;
+        let fraction = self.line.map_or(Vec3::ONE, |line| line.weight);
+        let wavelength = self.line.map(|line| line.wavelength);
+        Some(Outcome { fraction, media: self.after, wavelength, ..outcome })
     }
 }
 
-/// Absorption coefficient of what a ray goes on through; `before` is that of what it came through.
-#[inline]
-#[must_use]
-pub fn absorption_after(
-    material: &Material,
-    outcome: &Outcome,
-    surface: &SurfacePoint,
-    before: Vec3,
-) -> Vec3 {
-    match material {
-        Material::Glass { absorption, .. } if outcome.event == Event::Refraction => {
-            if outcome.direction.dot(surface.normal) < 0.0 { *absorption } else { Vec3::ZERO }
+impl Interaction {
+    fn times(mut self, share: f32) -> Self {
+        for outcome in [&mut self.reflected, &mut self.refracted].into_iter().flatten() {
+            outcome.fraction *= share;
         }
-        Material::Glass { .. } | Material::Diffuse { .. } | Material::Mirror { .. } | Material::Metal(_) => {
-            before
-        }
+        let some = |o: &Outcome| o.fraction != Vec3::ZERO;
+        Self { reflected: self.reflected.filter(some), refracted: self.refracted.filter(some) }
+    }
+
+    /// Both together. Reflections leave in the same direction; no mix has two materials that refract.
+    fn and(self, other: Self) -> Self {
+        let reflected = match (self.reflected, other.reflected) {
+            (Some(a), Some(b)) => Some(Outcome { fraction: a.fraction + b.fraction, ..a }),
+            (a, b) => a.or(b),
+        };
+        Self { reflected, refracted: self.refracted.or(other.refracted) }
+    }
+
+    /// Share of the light that takes any of the ways.
+    #[must_use]
+    pub fn share(&self) -> Vec3 {
+        [self.reflected, self.refracted].into_iter().flatten().map(|o| o.fraction).sum()
     }
 }
 
-/// Share of the light that is left after a way through an absorbing medium (Beer and Lambert).
-#[inline]
-#[must_use]
-pub fn transmittance(absorption: Vec3, distance: f32) -> Vec3 {
-    if absorption == Vec3::ZERO {
-        return Vec3::ONE;
+impl Outcome {
+    /// All light, as if there were no surface.
+    fn through(direction: Vec3) -> Self {
+        Self {
+            direction,
+            fraction: Vec3::ONE,
+            event: Event::Refraction,
+            radiance_scale: 1.0,
+            flux_scale: 1.0,
+            media: Media::default(),
+            wavelength: None,
+        }
     }
-    // A channel that is not absorbed is not over an infinite way either.
-    let left = |a: f32| if a > 0.0 { libm::expf(-a * distance) } else { 1.0 };
-    Vec3::new(left(absorption.x), left(absorption.y), left(absorption.z))
-}
-
-/// What a mirror does.
-#[must_use]
-pub fn mirror(direction: Vec3, surface: &SurfacePoint, reflectance: Vec3) -> Interaction {
-    let frame = Frame::new(direction, surface);
-    Interaction { reflected: Some(frame.reflected(direction, reflectance)), refracted: None }
-}
-
-/// What smooth glass of index `ior` on the inner side does.
-#[must_use]
-pub fn glass(direction: Vec3, surface: &SurfacePoint, ior: f32) -> Interaction {
-    let frame = Frame::new(direction, surface);
-    let eta = if frame.from_outside { 1.0 / ior } else { ior };
-    let reflectance = fresnel(-frame.shading.dot(direction), eta);
-    let refracted = frame.refracted(direction, eta).map(|mut outcome| {
-        outcome.fraction = Vec3::splat(1.0 - reflectance);
-        outcome
-    });
-    let reflectance = if refracted.is_none() { 1.0 } else { reflectance };
-    let reflected = (reflectance > 0.0).then(|| frame.reflected(direction, Vec3::splat(reflectance)));
-    Interaction { reflected, refracted }
 }
 
 /// The two normals turned to the side a ray comes from.
 struct Frame {
     geometric: Vec3,
     shading: Vec3,
-    from_outside: bool,
 }
 
 impl Frame {
@@ -218,7 +275,7 @@ impl Frame {
         let shading = surface.shading_normal * sign;
         // A ray that comes from behind the interpolated surface sees the flat one.
         let shading = if direction.dot(shading) < 0.0 { shading } else { geometric };
-        Self { geometric, shading, from_outside }
+        Self { geometric, shading }
     }
 
     fn reflected(&self, direction: Vec3, fraction: Vec3) -> Outcome {
@@ -228,13 +285,7 @@ impl Frame {
             out = reflect(direction, self.geometric);
             flux_scale = 1.0;
         }
-        Outcome {
-            direction: out.normalize(),
-            fraction,
-            event: Event::Reflection,
-            radiance_scale: 1.0,
-            flux_scale,
-        }
+        Outcome { fraction, event: Event::Reflection, flux_scale, ..Outcome::through(out.normalize()) }
     }
 
     fn refracted(&self, direction: Vec3, eta: f32) -> Option<Outcome> {
@@ -244,13 +295,7 @@ impl Frame {
             out = refract(direction, self.geometric, eta)?;
             flux_scale = 1.0;
         }
-        Some(Outcome {
-            direction: out,
-            fraction: Vec3::ONE,
-            event: Event::Refraction,
-            radiance_scale: eta * eta,
-            flux_scale,
-        })
+        Some(Outcome { radiance_scale: eta * eta, flux_scale, ..Outcome::through(out) })
     }
 
     /// |out·g| |in·s| / (|in·g| |out·s|).
@@ -264,4 +309,17 @@ impl Frame {
         // surface.
         (numerator / denominator).abs().clamp(0.0, 10.0)
     }
+}
+
+/// Factor on the flux of a photon that comes to rest on a surface of interpolated normals, so that its irradiance is
+/// that of the smooth surface: |in·s| / |in·g| (Veach 1997, 5.3), 0 where it comes from behind that surface.
+#[inline]
+#[must_use]
+pub fn resting_scale(direction: Vec3, surface: &SurfacePoint) -> f32 {
+    if surface.shading_normal == surface.normal {
+        return 1.0;
+    }
+    let quotient = direction.dot(surface.shading_normal) / direction.dot(surface.normal);
+    // As above, ten is beyond any tessellation that means a smooth surface; NaN becomes 0.
+    if quotient > 0.0 { quotient.min(10.0) } else { 0.0 }
 }

@@ -56,15 +56,8 @@ pub struct Lookup {
     pub sheet: SheetId,
     /// Radius of the kernel, m.
     pub radius: f32,
-}
-
-/// What a look-up found.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Irradiance {
-    /// Kernel-weighted sum of photon powers per area, W·m⁻².
-    pub value: Vec3,
-    /// How many photons contributed.
-    pub photons: u32,
+    /// Photons that arrive on the other side count too: the surface lets light through.
+    pub both_sides: bool,
 }
 
 /// The fixed rotation: every entry is a third or two, none near zero.
@@ -105,17 +98,22 @@ impl PhotonMap {
         self.count == 0
     }
 
-    /// Density estimate at a point with the Epanechnikov kernel 2/(πr²) (1 - d²/r²), which is unbiased where
-    /// the density is uniform. Only photons on the same sheet, with a similar normal, arriving on the side
-    /// that is seen, and near the tangent plane count.
+    /// Irradiance at a point.
     #[must_use]
-    pub fn irradiance(&self, lookup: &Lookup) -> Irradiance {
-        let mut found = Irradiance::default();
-        let Some(tree) = &self.tree else { return found };
+    pub fn irradiance(&self, lookup: &Lookup) -> Vec3 {
+        self.radiance(lookup, |_| Vec3::ONE)
+    }
+
+    /// Density estimate at a point with the Epanechnikov kernel 2/(πr²) (1 - d²/r²), which is unbiased where
+    /// the density is uniform; `per_irradiance` of the direction to where a photon came from weighs it. Only photons
+    /// on the same sheet, with a similar normal, arriving on the side that is seen, and near the tangent plane count.
+    #[must_use]
+    pub fn radiance(&self, lookup: &Lookup, per_irradiance: impl Fn(Vec3) -> Vec3) -> Vec3 {
+        let Some(tree) = &self.tree else { return Vec3::ZERO };
         let radius2 = lookup.radius * lookup.radius;
         // A radius of no size (or NaN) holds no photons and has no density.
         if !(lookup.radius > 0.0 && radius2 > 0.0 && radius2.is_finite()) {
-            return found;
+            return Vec3::ZERO;
         }
         let center = ROTATION * lookup.point;
         let normal = ROTATION * lookup.normal;
@@ -130,13 +128,15 @@ impl PhotonMap {
                 let height = (Vec3::from_array(hit.point) - center).dot(normal);
                 // The photon's plane may tilt by 45° over the kernel's radius at most.
                 let near_plane = height * height <= 0.5 * hit.distance + radius2 * 1e-4;
-                if same_sheet && near_plane && photon.arrives_on(lookup.normal) {
-                    sum += Vec3::from_array(photon.power) * (1.0 - hit.distance / radius2);
-                    found.photons += 1;
+                if same_sheet && near_plane && photon.is_aligned(lookup.normal) {
+                    let travels = decode_direction(photon.direction);
+                    if lookup.both_sides || travels.dot(lookup.normal) < 0.0 {
+                        let power = Vec3::from_array(photon.power) * (1.0 - hit.distance / radius2);
+                        sum += power * per_irradiance(-travels);
+                    }
                 }
             });
-        found.value = sum * (2.0 / (std::f32::consts::PI * radius2));
-        found
+        sum * (2.0 / (std::f32::consts::PI * radius2))
     }
 }
 
@@ -190,11 +190,16 @@ impl From<&Photon> for Stored {
 }
 
 impl Stored {
+    /// True if the photon's surface faces the same way, or the opposite.
+    #[inline]
+    fn is_aligned(&self, normal: Vec3) -> bool {
+        decode_direction(self.normal).dot(normal).abs() > NORMAL_COSINE
+    }
+
     /// True if the photon came from the side of `normal` and its surface faces the same way.
     #[inline]
     fn arrives_on(&self, normal: Vec3) -> bool {
-        let aligned = decode_direction(self.normal).dot(normal).abs() > NORMAL_COSINE;
-        aligned && decode_direction(self.direction).dot(normal) < 0.0
+        self.is_aligned(normal) && decode_direction(self.direction).dot(normal) < 0.0
     }
 }
 

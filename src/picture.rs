@@ -45,7 +45,7 @@ impl<'a> Picture<'a> {
         let layer = self.film.raw_layer(class);
         match class {
             PathClass::Caustic => self.corrected(layer),
-            PathClass::Emitted | PathClass::Direct => layer,
+            PathClass::Emitted | PathClass::Direct | PathClass::Indirect => layer,
         }
     }
 
@@ -86,7 +86,7 @@ impl<'a> Picture<'a> {
             return PixelError::default();
         }
         let half = |class| 0.5 * (means.halves[0].get(class) - means.halves[1].get(class));
-        let sampled = half(PathClass::Emitted) + half(PathClass::Direct);
+        let sampled = half(PathClass::Emitted) + half(PathClass::Direct) + half(PathClass::Indirect);
         let mut photons = half(PathClass::Caustic);
         let smoothed = self.smoothing.as_ref().and_then(|s| s.squared_error[index]);
         if smoothed.is_some() {

@@ -2,7 +2,7 @@
 
 use crate::effort::MOST_SHIFT;
 use crate::film::Film;
-use crate::light_path::Bounce;
+use crate::media::Media;
 use crate::pass1_light::{self, Block, Budget, Source, Tally, Window};
 use crate::pass2_eye::Footprints;
 use crate::photon_map;
@@ -19,6 +19,10 @@ pub struct Plan {
     pub photons: Vec<Budget>,
     /// Radius of the density estimate.
     pub radius: RadiusRule,
+    /// What the eye is inside of.
+    pub eye_media: Media,
+    /// Whether a ray can meet a light or the environment: highlights are then lit by scattered rays too.
+    pub lights_can_be_met: bool,
     /// Each choice with its reason.
     pub decisions: Vec<Decision>,
     /// What the user should know.
@@ -77,6 +81,9 @@ impl Plan {
         let mut plan = Self {
             photons: Vec::new(),
             radius: scene.render.radius,
+            eye_media: Media::around(scene, scene.camera.eye),
+            lights_can_be_met: scene.environment != Vec3::ZERO
+                || scene.lights.iter().any(|l| l.surface_radiance().is_some()),
             decisions: Vec::new(),
             warnings: Vec::new(),
             memory_bytes: 0,
@@ -94,7 +101,8 @@ impl Plan {
             None => plan.decide("lens", false, "pinhole", "the camera has no aperture: no lens samples"),
         }
         plan.decide("time", false, "one instant", "nothing moves: no time samples");
-        plan.decide("colour", true, "RGB", "nothing disperses light: no wavelengths");
+        plan.decide_colour(scene);
+        plan.decide_indirect(scene);
         plan.memory_bytes = plan.estimate_memory(scene);
         plan
     }
@@ -118,13 +126,12 @@ impl Plan {
             self.decide("pass 1", false, "no photons", "the paths asked for, LS*E|LDS*E, hold no caustic");
             return;
         }
-        let specular =
-            scene.objects.iter().any(|o| scene.materials[o.material.index()].bounce() == Bounce::Specular);
+        let specular = scene.objects.iter().any(|o| scene.materials[o.material.index()].has_specular());
         if !specular {
             self.decide("pass 1", false, "no photons", "no object is a mirror or glass: LS+DS*E is empty");
             return;
         }
-        if !scene.objects.iter().any(|o| receives(&scene.materials[o.material.index()])) {
+        if !scene.objects.iter().any(|o| scene.materials[o.material.index()].has_diffuse()) {
             self.decide(
                 "pass 1",
                 false,
@@ -233,6 +240,32 @@ impl Plan {
         }
     }
 
+    fn decide_colour(&mut self, scene: &Scene) {
+        let dispersive = |m: &Material| m.dielectric().is_some_and(|d| d.ior.is_dispersive());
+        if scene.objects.iter().any(|o| dispersive(&scene.materials[o.material.index()])) {
+            let reason = "only what comes through glass that disperses light gets a wavelength";
+            self.decide("colour", true, "RGB, and one wavelength per chain through a prism", reason);
+        } else {
+            self.decide("colour", false, "RGB", "nothing disperses light: no wavelengths");
+        }
+    }
+
+    fn decide_indirect(&mut self, scene: &Scene) {
+        if scene.render.paths == Paths::Complete {
+            let reason = "`complete` asks for L(D|S)*DS*DS*E";
+            self.decide("indirect light", true, "paths go on from each D", reason);
+            return;
+        }
+        self.decide("indirect light", false, "nothing", "the paths asked for end at the first D");
+        let rough = |m: &Material| !m.is_lambertian() && !matches!(m, Material::Phong(_));
+        if scene.objects.iter().any(|o| rough(&scene.materials[o.material.index()])) {
+            self.warn(
+                "rough_shows_lights_only",
+                "rough metal and glass are a D: without `\"paths\": \"complete\"` they show lights and caustics, not other things",
+            );
+        }
+    }
+
     fn decide_structure(&mut self, scene: &Scene) {
         let structure = scene.geometry.structure();
         let reason = scene.geometry.structure_reason();
@@ -260,13 +293,6 @@ impl Plan {
             if self.photons.is_empty() { 2 * film } else { (2 * film).max(pixels * SMOOTHING_BYTES) };
         let footprints = if self.photons.is_empty() { 0 } else { pixels * Footprints::BYTES_PER_PIXEL };
         scene.geometry.memory_bytes() + film + footprints + passing + photons * per_photon
-    }
-}
-
-fn receives(material: &Material) -> bool {
-    match material {
-        Material::Diffuse { albedo } => !albedo.is_black(),
-        Material::Mirror { .. } | Material::Metal(_) | Material::Glass { .. } => false,
     }
 }
 

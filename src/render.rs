@@ -230,7 +230,7 @@ impl Render {
     fn trace_footprints(&mut self) {
         let counted = !self.plan.photons.is_empty() && self.plan.radius == RadiusRule::Pixel;
         if counted && self.footprints.size().0 == 0 {
-            self.footprints = Footprints::trace(&self.scene);
+            self.footprints = Footprints::trace(&self.scene, &self.plan.eye_media);
         }
     }
 

@@ -4,7 +4,22 @@
 //! with the hash of Vegdahl 2021). Beyond [`SOBOL_DIMENSIONS`] dimensions a hash takes over.
 
 /// Number of dimensions that are low-discrepancy; later ones are independent random numbers.
-pub const SOBOL_DIMENSIONS: u32 = 16;
+pub const SOBOL_DIMENSIONS: u32 = 19;
+
+/// Dimension of a path's wavelength, in either pass.
+pub const WAVELENGTH_DIMENSION: u32 = 17;
+
+/// Events take two dimensions each; these, which have uses of their own, are none of them.
+const RESERVED_DIMENSIONS: std::ops::Range<u32> = 16..20;
+
+/// First dimension of the event number `event` of a path whose events begin at `first` (an even number).
+#[inline]
+#[must_use]
+pub fn event_dimension(first: u32, event: u32) -> u32 {
+    let dimension = first + 2 * event;
+    let past = dimension >= RESERVED_DIMENSIONS.start;
+    dimension + if past { RESERVED_DIMENSIONS.end - RESERVED_DIMENSIONS.start } else { 0 }
+}
 
 /// One point of one scrambled sequence: the index within it and the seed that scrambles it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,9 +96,9 @@ fn sobol(index: u32, dimension: usize) -> u32 {
     table[0][a] ^ table[1][b] ^ table[2][c] ^ table[3][d]
 }
 
-/// Primitive polynomials and initial direction numbers (s, a, m) of dimensions 2 to 16, from Joe and Kuo's
+/// Primitive polynomials and initial direction numbers (s, a, m) of dimensions 2 to 19, from Joe and Kuo's
 /// table new-joe-kuo-6.21201.
-const JOE_KUO: [(usize, u32, [u32; 6]); 15] = [
+const JOE_KUO: [(usize, u32, [u32; 6]); 18] = [
     (1, 0, [1, 0, 0, 0, 0, 0]),
     (2, 1, [1, 3, 0, 0, 0, 0]),
     (3, 1, [1, 3, 1, 0, 0, 0]),
@@ -99,6 +114,9 @@ const JOE_KUO: [(usize, u32, [u32; 6]); 15] = [
     (6, 1, [1, 3, 3, 9, 7, 49]),
     (6, 13, [1, 1, 1, 15, 21, 21]),
     (6, 16, [1, 3, 1, 13, 27, 49]),
+    (6, 19, [1, 1, 1, 15, 7, 5]),
+    (6, 22, [1, 3, 1, 15, 13, 25]),
+    (6, 25, [1, 1, 5, 5, 19, 61]),
 ];
 
 /// For each dimension and byte of the index, the exclusive or of the direction numbers of its set bits.

@@ -3,7 +3,7 @@
 use super::window::{Region, Source, Window};
 use crate::geometry::{Ray, offset_origin};
 use crate::sampling::{SamplePoint, concentric_disc, cone_direction, cosine_hemisphere, uniform_sphere};
-use crate::scene::{DiskLight, Light, LightPoint, ObjectId, QuadLight, Scene, SphereLight, SpotLight};
+use crate::scene::{DiskLight, Light, LightPoint, QuadLight, Scene, SphereLight, SpotLight};
 use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
 
@@ -51,10 +51,10 @@ impl<'a> Emission<'a> {
         Self { window, source, retreat: 2.5 * bounds.radius() }
     }
 
-    /// The object that the window is for.
+    /// The window.
     #[must_use]
-    pub fn caster(&self) -> ObjectId {
-        self.window.caster
+    pub fn window(&self) -> &Window {
+        self.window
     }
 
     /// Draws a photon; `None` where the light gives nothing in the drawn direction.

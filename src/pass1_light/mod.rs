@@ -18,7 +18,7 @@ use crate::sampling::{SamplePoint, hash};
 use crate::scene::Scene;
 use guide::Lesson;
 use rayon::prelude::*;
-use walk::{Fate, walk};
+use walk::PhotonWalk;
 
 /// Photons traced between two looks at the cancel flag; also the unit of parallel work.
 const BATCH: u32 = 4096;
@@ -146,6 +146,7 @@ fn trace_batch(
     block: Block,
     points: std::ops::Range<u32>,
 ) -> (Vec<Photon>, Tally) {
+    let walk = PhotonWalk::new(scene, emission.window());
     let mut photons = Vec::with_capacity(points.len());
     let mut tally = Tally::default();
     let share = 1.0 / block.count as f32;
@@ -155,9 +156,7 @@ fn trace_batch(
         let Some(mut photon) = emission.sample(sample) else { continue };
         photon.power *= share;
         tally.energy.emitted += photon.power.as_dvec3();
-        if let Fate::Stored(stored) = walk(scene, emission.caster(), photon, sample, &mut tally) {
-            photons.push(stored);
-        }
+        walk.trace(photon, sample, &mut tally, |resting| photons.push(resting));
     }
     (photons, tally)
 }
@@ -166,6 +165,7 @@ fn trace_batch(
 #[must_use]
 pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Guide>) {
     let emission = Emission::new(scene, window);
+    let walk = PhotonWalk::new(scene, window);
     let mut lesson = Lesson::new();
     let mut tally = Tally::default();
     for i in 0..block.count {
@@ -174,8 +174,10 @@ pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Gui
         let Some(mut photon) = emission.sample(sample) else { continue };
         photon.power /= block.count as f32;
         tally.energy.emitted += photon.power.as_dvec3();
-        if let Fate::Stored(stored) = walk(scene, emission.caster(), photon, sample, &mut tally) {
-            lesson.delivered(sample.get_2d(0), stored.power.element_sum());
+        let mut power = 0.0;
+        walk.trace(photon, sample, &mut tally, |resting| power += resting.power.element_sum());
+        if power > 0.0 {
+            lesson.delivered(sample.get_2d(0), power);
         }
     }
     (tally, lesson.learn())

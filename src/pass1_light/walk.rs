@@ -2,14 +2,17 @@
 
 use super::emit::EmittedPhoton;
 use super::energy::Tally;
+use super::window::Window;
 use crate::geometry::{Hit, Ray, offset_origin};
-use crate::optics::{self, Interaction, Outcome};
+use crate::media::Media;
+use crate::optics::{Arrival, Interaction, Outcome, resting_scale, transmittance};
 use crate::photon_map::Photon;
-use crate::sampling::SamplePoint;
+use crate::sampling::{SamplePoint, WAVELENGTH_DIMENSION, event_dimension};
 use crate::scene::{ObjectId, Scene};
+use crate::spectrum;
 use glam::Vec3;
 
-/// Sobol dimensions 0 to 3 draw the window and the light; each event takes one more.
+/// Sobol dimensions 0 to 3 draw the window and the light; each event takes two more.
 const FIRST_EVENT_DIMENSION: u32 = 4;
 
 /// A photon that has met this many S is cut: between two mirrors of reflectance 0.99 it has then lost 92 %.
@@ -18,77 +21,85 @@ const MAX_BOUNCES: u32 = 256;
 /// Below this fraction of its first power a photon plays roulette for its life.
 const ROULETTE_BELOW: f32 = 0.05;
 
-/// What became of a photon.
-pub(super) enum Fate {
-    /// It rests on a D.
-    Stored(Photon),
-    /// It was taken up, left, or was another estimator's.
-    Gone,
+/// Sends photons on their way through a scene.
+pub(super) struct PhotonWalk<'a> {
+    scene: &'a Scene,
+    /// The object that a photon must meet first.
+    caster: ObjectId,
+    /// What the light is inside of.
+    media: Media,
 }
 
-/// Traces one photon. Its first surface must be the window's caster.
-pub(super) fn walk(
-    scene: &Scene,
-    caster: ObjectId,
-    photon: EmittedPhoton,
-    sample: SamplePoint,
-    tally: &mut Tally,
-) -> Fate {
-    let EmittedPhoton { mut ray, mut power } = photon;
-    let first_power = power.max_element();
-    // Of what the photon flies through.
-    let mut absorption = Vec3::ZERO;
-    for bounce in 0..MAX_BOUNCES {
-        tally.rays += 1;
-        let Some(hit) = scene.geometry.closest_hit(&ray) else {
-            if bounce == 0 {
-                tally.energy.missed += power.as_dvec3();
-            } else {
-                tally.escaped += 1;
-                tally.energy.escaped += power.as_dvec3();
-            }
-            return Fate::Gone;
-        };
-        if bounce == 0 {
-            if hit.object != caster {
-                tally.energy.missed += power.as_dvec3();
-                return Fate::Gone;
-            }
-            tally.hit_caster += 1;
-        }
-        let material = scene.material_of(hit.object);
-        let came_through = optics::absorption_before(material, ray.direction, &hit.surface, absorption);
-        let left = power * optics::transmittance(came_through, hit.t);
-        tally.energy.absorbed += power.as_dvec3() - left.as_dvec3();
-        power = left;
-        if power == Vec3::ZERO {
-            return Fate::Gone;
-        }
-        let Some(interaction) = optics::interact(material, ray.direction, &hit.surface) else {
-            tally.stored += 1;
-            tally.energy.stored += power.as_dvec3();
-            return Fate::Stored(at_rest(&ray, &hit, power));
-        };
-        let u = sample.get(FIRST_EVENT_DIMENSION + 2 * bounce);
-        let Some((outcome, weight)) = choose(&interaction, u) else {
-            tally.energy.absorbed += power.as_dvec3();
-            return Fate::Gone;
-        };
-        let kept = power * weight;
-        tally.energy.absorbed += power.as_dvec3() - kept.as_dvec3();
-        power = kept;
-        let u = sample.get(FIRST_EVENT_DIMENSION + 2 * bounce + 1);
-        if !survive(&mut power, first_power, u, tally) {
-            return Fate::Gone;
-        }
-        let origin =
-            offset_origin(hit.surface.point, hit.surface.error, hit.surface.normal, outcome.direction);
-        absorption = optics::absorption_after(material, &outcome, &hit.surface, came_through);
-        ray = ray.continue_from(origin, outcome.direction);
+impl<'a> PhotonWalk<'a> {
+    /// For the photons of a window.
+    pub(super) fn new(scene: &'a Scene, window: &Window) -> Self {
+        Self { scene, caster: window.caster, media: window.media }
     }
-    tally.cut += 1;
-    tally.energy.cut += power.as_dvec3();
-    Fate::Gone
+
+    /// Traces one photon; gives `store` what rests on a D. On what is D and S, light rests and goes on.
+    pub(super) fn trace(
+        &self,
+        photon: EmittedPhoton,
+        sample: SamplePoint,
+        tally: &mut Tally,
+        mut store: impl FnMut(Photon),
+    ) {
+        let EmittedPhoton { mut ray, mut power } = photon;
+        let first_power = power.max_element();
+        let (mut media, mut wavelength) = (self.media, None);
+        for bounce in 0..MAX_BOUNCES {
+            tally.rays += 1;
+            let Some(hit) = self.scene.geometry.closest_hit(&ray) else {
+                if bounce == 0 {
+                    tally.energy.missed += power.as_dvec3();
+                } else {
+                    tally.escaped += 1;
+                    tally.energy.escaped += power.as_dvec3();
+                }
+                return;
+            };
+            if bounce == 0 {
+                if hit.object != self.caster {
+                    tally.energy.missed += power.as_dvec3();
+                    return;
+                }
+                tally.hit_caster += 1;
+            }
+            let arrival = Arrival::new(self.scene, &hit, ray.direction, &media, wavelength);
+            let left = power * transmittance(arrival.media.absorption(self.scene), hit.t);
+            tally.energy.absorbed += power.as_dvec3() - left.as_dvec3();
+            power = left;
+            if power == Vec3::ZERO {
+                return;
+            }
+            let interaction = arrival.interact(|| spectrum::pick(sample.get(WAVELENGTH_DIMENSION)));
+            // What rests on the first surface is direct light: not the photons' part.
+            if bounce > 0 && arrival.material().has_diffuse() {
+                let resting = power * (Vec3::ONE - interaction.share());
+                tally.stored += 1;
+                tally.energy.stored += resting.as_dvec3();
+                store(at_rest(&ray, &hit, power));
+                power -= resting;
+            }
+            let dimension = event_dimension(FIRST_EVENT_DIMENSION, bounce);
+            let Some((outcome, weight)) = choose(&interaction, sample.get(dimension)) else {
+                tally.energy.absorbed += power.as_dvec3();
+                return;
+            };
+            let kept = left * weight;
+            tally.energy.absorbed += power.as_dvec3() - kept.as_dvec3();
+            power = kept;
+            if !survive(&mut power, first_power, sample.get(dimension + 1), tally) {
+                return;
+            }
+            let surface = &hit.surface;
+            let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
+            (media, wavelength) = (outcome.media, outcome.wavelength);
+            ray = ray.continue_from(origin, outcome.direction);
+        }
+        tally.cut += 1;
+        tally.energy.cut += power.as_dvec3();
+    }
 }
 
 /// Picks reflection or refraction in proportion to their shares; also the factor on the photon's power.
@@ -128,6 +139,6 @@ fn at_rest(ray: &Ray, hit: &Hit, power: Vec3) -> Photon {
         direction: ray.direction,
         normal: hit.surface.normal,
         sheet: hit.sheet,
-        power,
+        power: power * resting_scale(ray.direction, &hit.surface),
     }
 }

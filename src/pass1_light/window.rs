@@ -5,7 +5,7 @@
 
 use super::guide::Guide;
 use crate::geometry::{Bounds, Geometry, HullPoint};
-use crate::light_path::Bounce;
+use crate::media::Media;
 use crate::scene::{Light, LightId, ObjectId, Scene, SphereLight};
 use glam::{Vec2, Vec3};
 
@@ -23,6 +23,8 @@ pub enum Source {
 pub struct Window {
     /// Where the light comes from.
     pub source: Source,
+    /// What the source is inside of.
+    pub media: Media,
     /// The object the photons must meet first.
     pub caster: ObjectId,
     /// The bound.
@@ -66,7 +68,7 @@ const MARGIN: f32 = 1e-4;
 pub fn windows(scene: &Scene) -> Vec<Window> {
     let casters: Vec<ObjectId> = (0..scene.objects.len() as u32)
         .map(ObjectId)
-        .filter(|&o| scene.material_of(o).bounce() == Bounce::Specular)
+        .filter(|&o| scene.material_of(o).has_specular())
         .filter(|&o| !scene.geometry.object_bounds(o).is_empty())
         .collect();
     let mut sources: Vec<Source> = (0..scene.lights.len() as u32)
@@ -80,12 +82,16 @@ pub fn windows(scene: &Scene) -> Vec<Window> {
     let hulls: Vec<Vec<HullPoint>> = casters.iter().map(|&o| scene.geometry.hull(o)).collect();
     let mut windows = Vec::new();
     for &source in &sources {
+        let media = match source {
+            Source::Light(id) => Media::around_light(scene, &scene.lights[id.index()]),
+            Source::Environment => Media::default(),
+        };
         for (&caster, hull) in casters.iter().zip(&hulls) {
             let region = match source {
                 Source::Light(id) => region(&scene.lights[id.index()], &scene.geometry, caster, hull),
                 Source::Environment => enclosing_disc(&scene.geometry, caster),
             };
-            windows.push(Window { source, caster, region, guide: None });
+            windows.push(Window { source, media, caster, region, guide: None });
         }
     }
     windows

@@ -1,5 +1,7 @@
-//! Pass 2, `LD`: light that reaches a D straight from the lights, by shadow rays.
+//! Pass 2, `LD`: light that reaches a D straight from the lights, by shadow rays; where highlights are sharp, also by
+//! rays that the surface scatters and that meet a light, both weighted by the power heuristic (Veach 1997, 9.2).
 
+use crate::bsdf::Bsdf;
 use crate::geometry::{Ray, SurfacePoint, offset_origin};
 use crate::optics::transmittance;
 use crate::sampling::{SamplePoint, cosine_hemisphere};
@@ -11,16 +13,16 @@ mod area;
 mod spherical_rectangle;
 mod strata;
 
+pub(super) use area::density_toward;
+
 use area::{from_disk, from_mesh, from_quad, from_sphere};
 use strata::Strata;
 
-/// The surface that is lit, on the side that is seen.
+/// The surface that is lit, as the eye sees it.
 pub(super) struct Receiver<'a> {
+    pub(super) scene: &'a Scene,
     pub(super) surface: &'a SurfacePoint,
-    /// Normal on the side that is seen.
-    pub(super) normal: Vec3,
-    /// Absorption coefficient of the medium on that side.
-    pub(super) absorption: Vec3,
+    pub(super) bsdf: &'a Bsdf,
     /// When it is seen: the shadow rays' time.
     pub(super) time: f32,
 }
@@ -31,23 +33,71 @@ struct Incident {
     direction: Vec3,
     /// Where the light is, to the precision of the shadow ray; infinity for a direction.
     distance: f32,
-    /// Irradiance it gives if nothing is in between, W·m⁻².
+    /// Irradiance it gives, if nothing is in between, to a surface that faces it, W·m⁻².
     irradiance: Vec3,
+    /// Density per solid angle with which the direction was drawn; `None` of the only direction there is.
+    pdf: Option<f32>,
 }
 
-/// Irradiance of all lights at a D, one shadow ray each unless the scene asks for more.
-pub(super) fn direct_light(
-    scene: &Scene,
-    receiver: &Receiver<'_>,
-    sample: SamplePoint,
-    shadow_rays: &mut u64,
-) -> Vec3 {
+impl Receiver<'_> {
+    /// Whether light from a direction can be seen at all.
+    #[inline]
+    fn faces(&self, direction: Vec3) -> bool {
+        let bsdf = self.bsdf;
+        bsdf.transmits() || (direction.dot(bsdf.geometric) > 0.0 && direction.dot(bsdf.shading) > 0.0)
+    }
+
+    /// Radiance if nothing is in the way.
+    fn radiance(&self, incident: &Incident) -> Vec3 {
+        let value = self.bsdf.eval(incident.direction) * incident.irradiance;
+        match incident.pdf {
+            Some(pdf) if self.bsdf.albedo().is_none() => {
+                value * power_heuristic(pdf, self.bsdf.pdf(incident.direction))
+            }
+            Some(_) | None => value,
+        }
+    }
+
+    /// Radiance, as far as nothing is in the way. S surfaces are in the way too: what comes through them is the
+    /// photons' part.
+    fn visible(&self, incident: Option<Incident>, rays: &mut u64) -> Vec3 {
+        let Some(incident) = incident else { return Vec3::ZERO };
+        let radiance = self.radiance(&incident);
+        if radiance.max_element() <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let Receiver { scene, surface, bsdf, time } = self;
+        let origin = offset_origin(surface.point, surface.error, bsdf.geometric, incident.direction);
+        *rays += 1;
+        let shadow_ray = Ray::new(origin, incident.direction).at_time(*time);
+        if scene.geometry.any_hit(&shadow_ray, incident.distance) {
+            return Vec3::ZERO;
+        }
+        // Nothing was met on the way, so that the light is in the same medium.
+        let absorption = bsdf.media_toward(incident.direction).absorption(scene);
+        radiance * transmittance(absorption, incident.distance)
+    }
+}
+
+/// Weight of a sample drawn with density `pdf` beside another estimator that draws it with density `other`.
+#[inline]
+pub(super) fn power_heuristic(pdf: f32, other: f32) -> f32 {
+    if other <= 0.0 {
+        return 1.0;
+    }
+    let ratio = other / pdf;
+    1.0 / (1.0 + ratio * ratio)
+}
+
+/// Radiance from all lights at a D, one shadow ray each unless the scene asks for more.
+pub(super) fn direct_light(receiver: &Receiver<'_>, sample: SamplePoint, shadow_rays: &mut u64) -> Vec3 {
+    let scene = receiver.scene;
     let mut sum = Vec3::ZERO;
     for (i, light) in scene.lights.iter().enumerate() {
         let sample = if i == 0 { sample } else { sample.branch(i as u64) };
-        let mut strata = Strata { scene, receiver, light, shadow_rays };
-        if let Some(irradiance) = strata.irradiance(sample) {
-            sum += irradiance;
+        let mut strata = Strata { receiver, light, shadow_rays };
+        if let Some(radiance) = strata.radiance(sample) {
+            sum += radiance;
             continue;
         }
         let incident = match light {
@@ -59,34 +109,20 @@ pub(super) fn direct_light(
             Light::Sphere(sphere) => from_sphere(receiver, sphere, sample.get_2d(2)),
             Light::Mesh(mesh) => from_mesh(receiver, mesh, sample.get_2d(2)),
         };
-        sum += visible(scene, receiver, incident, shadow_rays);
+        sum += receiver.visible(incident, shadow_rays);
     }
-    if scene.environment != Vec3::ZERO {
-        let direction = cosine_hemisphere(receiver.normal, sample.get_2d(4));
-        // The density cosθ/π cancels the cosine.
-        let irradiance = scene.environment * PI;
-        let incident = Incident { direction, distance: f32::INFINITY, irradiance };
-        sum += visible(scene, receiver, Some(incident), shadow_rays);
+    // What shines from all around is left to scattered rays where highlights are sharp.
+    if scene.environment != Vec3::ZERO && receiver.bsdf.albedo().is_some() {
+        let direction = cosine_hemisphere(receiver.bsdf.shading, sample.get_2d(4));
+        // The density cosθ/π cancels the cosine of the BSDF.
+        let cosine = direction.dot(receiver.bsdf.shading).max(f32::MIN_POSITIVE);
+        let irradiance = scene.environment * (PI / cosine);
+        sum += receiver.visible(
+            Some(Incident { direction, distance: f32::INFINITY, irradiance, pdf: None }),
+            shadow_rays,
+        );
     }
     sum
-}
-
-/// The irradiance if nothing is in the way. S surfaces are in the way too: what comes through them is the
-/// photons' part.
-fn visible(scene: &Scene, receiver: &Receiver<'_>, incident: Option<Incident>, rays: &mut u64) -> Vec3 {
-    let Some(incident) = incident else { return Vec3::ZERO };
-    if incident.irradiance.max_element() <= 0.0 {
-        return Vec3::ZERO;
-    }
-    let surface = receiver.surface;
-    let origin = offset_origin(surface.point, surface.error, receiver.normal, incident.direction);
-    *rays += 1;
-    let shadow_ray = Ray::new(origin, incident.direction).at_time(receiver.time);
-    if scene.geometry.any_hit(&shadow_ray, incident.distance) {
-        return Vec3::ZERO;
-    }
-    // Nothing was met on the way, so that the light is in the same medium.
-    incident.irradiance * transmittance(receiver.absorption, incident.distance)
 }
 
 fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Option<Incident> {
@@ -98,9 +134,9 @@ fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Optio
         return None;
     }
     let direction = to / distance;
-    let cosine = receiver.normal.dot(direction);
-    let irradiance = intensity * (cosine.max(0.0) / distance2);
-    (cosine > 0.0).then_some(Incident { direction, distance: short_of(distance), irradiance })
+    let irradiance = intensity / distance2;
+    let incident = Incident { direction, distance: short_of(distance), irradiance, pdf: None };
+    receiver.faces(direction).then_some(incident)
 }
 
 fn from_spot(receiver: &Receiver<'_>, spot: &SpotLight) -> Option<Incident> {
@@ -110,12 +146,8 @@ fn from_spot(receiver: &Receiver<'_>, spot: &SpotLight) -> Option<Incident> {
 }
 
 fn from_afar(receiver: &Receiver<'_>, direction: Vec3, irradiance: Vec3) -> Option<Incident> {
-    let cosine = -receiver.normal.dot(direction);
-    (cosine > 0.0).then_some(Incident {
-        direction: -direction,
-        distance: f32::INFINITY,
-        irradiance: irradiance * cosine,
-    })
+    let incident = Incident { direction: -direction, distance: f32::INFINITY, irradiance, pdf: None };
+    receiver.faces(-direction).then_some(incident)
 }
 
 /// A few ulps less, so that rounding of the distance cannot put the shadow ray's end behind the light.

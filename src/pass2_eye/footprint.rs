@@ -5,10 +5,12 @@
 //! and neighbours share them, so that every photon falls on exactly one pixel: nothing is blurred, and the even
 //! spacing of low-discrepancy photons is not lost to random places of looking.
 
-use crate::geometry::{Hit, Ray, SheetId, offset_origin};
-use crate::optics::{self, Interaction};
+use crate::geometry::{SheetId, SurfacePoint, offset_origin};
+use crate::media::Media;
+use crate::optics::Arrival;
 use crate::sampling::hash;
 use crate::scene::Scene;
+use crate::spectrum::Line;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -67,7 +69,7 @@ const STRAIGHTNESS: f32 = 0.1;
 impl Footprints {
     /// Traces the corners of all pixels. Through a lens no pixel has a footprint.
     #[must_use]
-    pub fn trace(scene: &Scene) -> Self {
+    pub fn trace(scene: &Scene, eye_media: &Media) -> Self {
         let (width, height) = (scene.image.width as usize, scene.image.height as usize);
         if scene.camera.lens().is_some() {
             // Through a lens a pixel sees more than lies between its corners: photons are looked up instead.
@@ -75,7 +77,7 @@ impl Footprints {
         }
         let corners: Vec<Vec<Option<Landing>>> = (0..=height)
             .into_par_iter()
-            .map(|y| (0..=width).map(|x| land(scene, Vec2::new(x as f32, y as f32))).collect())
+            .map(|y| (0..=width).map(|x| land(scene, eye_media, Vec2::new(x as f32, y as f32))).collect())
             .collect();
         let rows: Vec<Vec<Option<Footprint>>> = (0..height)
             .into_par_iter()
@@ -83,7 +85,8 @@ impl Footprints {
                 let (above, below) = (&corners[y], &corners[y + 1]);
                 let pixel = |x: usize| {
                     let around = [above[x]?, above[x + 1]?, below[x + 1]?, below[x]?];
-                    Footprint::between(scene, &around, Vec2::new(x as f32 + 0.5, y as f32 + 0.5))
+                    let middle = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                    Footprint::between(&around, || land(scene, eye_media, middle))
                 };
                 (0..width).map(pixel).collect()
             })
@@ -109,7 +112,7 @@ impl Footprints {
 }
 
 impl Footprint {
-    fn between(scene: &Scene, around: &[Landing; 4], middle: Vec2) -> Option<Self> {
+    fn between(around: &[Landing; 4], middle: impl Fn() -> Option<Landing>) -> Option<Self> {
         let first = around[0];
         let alike = |l: &Landing| {
             l.sheet == first.sheet && l.key == first.key && l.normal.dot(first.normal) > SAME_FACE
@@ -131,7 +134,7 @@ impl Footprint {
             return None;
         }
         if first.key != 1 {
-            let landing = land(scene, middle)?;
+            let landing = middle()?;
             let center = corners.iter().sum::<Vec3>() / 4.0;
             let diagonal = (corners[2] - corners[0]).length().max((corners[3] - corners[1]).length());
             let straight = (landing.point - center).length() <= STRAIGHTNESS * diagonal;
@@ -151,30 +154,42 @@ impl Footprint {
     }
 }
 
-/// Follows the main way from a raster position to a D.
-fn land(scene: &Scene, raster: Vec2) -> Option<Landing> {
+/// Follows the main way from a raster position to the first D; `None` if that has highlights, where irradiance alone
+/// does not say what is seen, or if light is taken apart on the way.
+fn land(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
     let mut ray = scene.camera.ray(raster);
+    let mut media = *eye_media;
     let mut key = 1_u64;
     let mut only_way = true;
     for _ in 0..MOST_BOUNCES {
         let hit = scene.geometry.closest_hit(&ray)?;
-        let Some(interaction) = interact(scene, &ray, &hit) else {
-            let surface = &hit.surface;
-            let backside = ray.direction.dot(surface.normal) > 0.0;
-            let normal = if backside { -surface.normal } else { surface.normal };
-            return Some(Landing { point: surface.point, normal, sheet: hit.sheet, key, only_way });
-        };
+        let arrival = Arrival::new(scene, &hit, ray.direction, &media, None);
+        let interaction = arrival.interact(|| UNDISPERSED);
+        let material = arrival.material();
+        let surface = &hit.surface;
+        if material.has_diffuse() {
+            let normal = facing(surface, ray.direction);
+            only_way &= interaction.reflected.is_none() && interaction.refracted.is_none();
+            let landing = Landing { point: surface.point, normal, sheet: hit.sheet, key, only_way };
+            return material.is_lambertian().then_some(landing);
+        }
         only_way &= interaction.reflected.is_none() || interaction.refracted.is_none();
         let outcome = interaction.refracted.or(interaction.reflected)?;
+        if outcome.wavelength.is_some() {
+            return None;
+        }
         key = outcome.extend_key(key);
-        let surface = &hit.surface;
+        media = outcome.media;
         let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
         ray = ray.continue_from(origin, outcome.direction);
     }
     None
 }
 
-/// What the surface does if it is an S.
-fn interact(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<Interaction> {
-    optics::interact(scene.material_of(hit.object), ray.direction, &hit.surface)
+/// Stands for the wavelength of light that is taken apart: such ways are not followed.
+const UNDISPERSED: Line = Line { wavelength: crate::scene::FRAUNHOFER[1], weight: Vec3::ONE };
+
+/// The geometric normal on the side that a ray comes from.
+fn facing(surface: &SurfacePoint, direction: Vec3) -> Vec3 {
+    if direction.dot(surface.normal) > 0.0 { -surface.normal } else { surface.normal }
 }

@@ -1,5 +1,6 @@
 //! Pass 2, `…E`: rays backward from the eye; each class of paths in its own layer.
 
+mod arrive;
 mod direct;
 mod footprint;
 mod specular;

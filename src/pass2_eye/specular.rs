@@ -6,15 +6,13 @@
 //! still add.
 
 use super::EyeContext;
-use super::direct::{Receiver, direct_light};
-use super::footprint::view_code;
 use crate::film::PixelSums;
 use crate::geometry::{Hit, Ray, offset_origin};
 use crate::light_path::PathClass;
-use crate::optics::{self, Event, Interaction, Outcome};
-use crate::photon_map::Lookup;
-use crate::sampling::SamplePoint;
-use crate::scene::{Material, Texture};
+use crate::media::Media;
+use crate::optics::{Arrival, Event, Interaction, Outcome, transmittance};
+use crate::sampling::{SamplePoint, WAVELENGTH_DIMENSION, event_dimension};
+use crate::spectrum;
 use glam::{Vec2, Vec3};
 
 /// Both ways are followed while each still carries this share of the pixel.
@@ -68,32 +66,50 @@ pub(super) enum Lookups {
 
 /// Follows eye rays; owns the stack of branches yet to follow.
 pub(super) struct EyeWalk<'a> {
-    context: &'a EyeContext<'a>,
+    pub(super) context: &'a EyeContext<'a>,
     /// Radius of the density estimate in pixels.
-    kernel_pixels: f32,
+    pub(super) kernel_pixels: f32,
     stack: Vec<Branch>,
     /// The eye sample that is being followed.
-    half: usize,
-    sample: SamplePoint,
-    lookups: Lookups,
-    view: Option<u32>,
+    pub(super) half: usize,
+    pub(super) sample: SamplePoint,
+    pub(super) lookups: Lookups,
+    pub(super) view: Option<u32>,
     pub(super) counts: EyeCounts,
 }
 
 /// A ray on its way from the eye.
 #[derive(Clone, Copy)]
-struct Branch {
-    ray: Ray,
-    throughput: Vec3,
-    /// Absorption coefficient of what the ray goes through.
-    absorption: Vec3,
-    bounces: u32,
+pub(super) struct Branch {
+    pub(super) ray: Ray,
+    pub(super) throughput: Vec3,
+    /// What the ray is inside of.
+    pub(super) media: Media,
+    /// Its wavelength, μm; `None` is light of all wavelengths.
+    pub(super) wavelength: Option<f32>,
+    /// Surfaces it has left.
+    pub(super) bounces: u32,
     /// Length of the way from the eye.
-    travelled: f32,
-    /// Which ways were taken: one bit per S, after a leading 1.
-    key: u64,
+    pub(super) travelled: f32,
+    /// Which ways were taken: one bit per S, after a leading 1; a hash after a D.
+    pub(super) key: u64,
     /// The eye's main way: refracted where it can be, and never by chance.
-    main: bool,
+    pub(super) main: bool,
+    /// The last D on its way, if there was one.
+    pub(super) scattered: Option<Scattered>,
+}
+
+/// A D on the way of a ray from the eye.
+#[derive(Clone, Copy)]
+pub(super) struct Scattered {
+    /// How many D there were.
+    pub(super) count: u32,
+    /// Where it is.
+    pub(super) point: Vec3,
+    /// Density per solid angle of the direction it was left in; `None` if lights are another estimator's alone.
+    pub(super) pdf: Option<f32>,
+    /// Nothing but the D lies between it and the ray: no S.
+    pub(super) straight: bool,
 }
 
 impl<'a> EyeWalk<'a> {
@@ -129,11 +145,13 @@ impl<'a> EyeWalk<'a> {
         self.stack.push(Branch {
             ray,
             throughput: Vec3::ONE,
-            absorption: Vec3::ZERO,
+            media: self.context.plan.eye_media,
+            wavelength: None,
             bounces: 0,
             travelled: 0.0,
             key: 1,
             main: true,
+            scattered: None,
         });
         while let Some(branch) = self.stack.pop() {
             self.follow(branch, sums);
@@ -144,48 +162,46 @@ impl<'a> EyeWalk<'a> {
         let scene = self.context.scene;
         self.counts.eye_rays += 1;
         let Some(hit) = scene.geometry.closest_hit(&branch.ray) else {
-            let throughput = branch.throughput * optics::transmittance(branch.absorption, f32::INFINITY);
-            sums.halves[self.half].classes.add(PathClass::Emitted, throughput * scene.environment);
+            branch.throughput *= transmittance(branch.media.absorption(scene), f32::INFINITY);
+            self.escape(&branch, sums);
             return;
         };
-        let material = scene.material_of(hit.object);
-        let direction = branch.ray.direction;
-        branch.absorption = optics::absorption_before(material, direction, &hit.surface, branch.absorption);
-        branch.throughput *= optics::transmittance(branch.absorption, hit.t);
-        match material {
-            Material::Diffuse { albedo } => self.arrive(&branch, &hit, albedo, sums),
-            Material::Mirror { .. } | Material::Metal(_) | Material::Glass { .. } => {
-                if let Some(interaction) = optics::interact(material, direction, &hit.surface) {
-                    self.scatter(&branch, &hit, &interaction);
-                }
-            }
-        }
+        let arrival = Arrival::new(scene, &hit, branch.ray.direction, &branch.media, branch.wavelength);
+        branch.media = arrival.media;
+        branch.throughput *= transmittance(branch.media.absorption(scene), hit.t);
+        let rests = self.arrive(&branch, &arrival, sums);
+        // The main way ends at the first D.
+        branch.main &= !rests;
+        let pick = self.sample.branch(branch.key);
+        let interaction = arrival.interact(|| spectrum::pick(pick.get(WAVELENGTH_DIMENSION)));
+        self.scatter(&branch, &hit, &interaction);
     }
 
     /// Puts the ways that leave an S onto the stack.
     fn scatter(&mut self, branch: &Branch, hit: &Hit, interaction: &Interaction) {
-        if branch.bounces >= MAX_BOUNCES {
-            self.counts.cut += 1;
+        let (a, b) = match (interaction.reflected, interaction.refracted) {
+            (None, None) => return,
+            _ if branch.bounces >= MAX_BOUNCES => {
+                self.counts.cut += 1;
+                return;
+            }
+            (Some(only), None) | (None, Some(only)) => {
+                self.push(branch, hit, &only, 1.0, branch.main);
+                return;
+            }
+            (Some(a), Some(b)) => (a, b),
+        };
+        let weight = |o: &Outcome| (branch.throughput * o.fraction).max_element();
+        if branch.scattered.is_none() && weight(&a).min(weight(&b)) >= SPLIT_ABOVE {
+            self.push(branch, hit, &b, 1.0, branch.main);
+            self.push(branch, hit, &a, 1.0, false);
             return;
         }
-        let dimension = FIRST_EVENT_DIMENSION + 2 * branch.bounces;
-        match (interaction.reflected, interaction.refracted) {
-            (Some(a), Some(b)) => {
-                let weight = |o: &Outcome| (branch.throughput * o.fraction).max_element();
-                if weight(&a).min(weight(&b)) >= SPLIT_ABOVE {
-                    self.push(branch, hit, &b, 1.0, branch.main);
-                    self.push(branch, hit, &a, 1.0, false);
-                    return;
-                }
-                let share = weight(&a) / (weight(&a) + weight(&b));
-                let u = self.sample.branch(branch.key).get(dimension);
-                let (outcome, probability) = if u < share { (a, share) } else { (b, 1.0 - share) };
-                let main = branch.main && outcome.event == Event::Refraction;
-                self.push(branch, hit, &outcome, probability, main);
-            }
-            (Some(only), None) | (None, Some(only)) => self.push(branch, hit, &only, 1.0, branch.main),
-            (None, None) => {}
-        }
+        let share = weight(&a) / (weight(&a) + weight(&b));
+        let u = self.sample.branch(branch.key).get(event_dimension(FIRST_EVENT_DIMENSION, branch.bounces));
+        let (outcome, probability) = if u < share { (a, share) } else { (b, 1.0 - share) };
+        let main = branch.main && outcome.event == Event::Refraction;
+        self.push(branch, hit, &outcome, probability, main);
     }
 
     fn push(&mut self, branch: &Branch, hit: &Hit, outcome: &Outcome, probability: f32, main: bool) {
@@ -193,73 +209,41 @@ impl<'a> EyeWalk<'a> {
         let strength = throughput.max_element();
         if strength < ROULETTE_BELOW {
             let survival = strength / ROULETTE_BELOW;
-            let u = self.sample.branch(branch.key).get(FIRST_EVENT_DIMENSION + 2 * branch.bounces + 1);
-            if u >= survival {
+            let dimension = event_dimension(FIRST_EVENT_DIMENSION, branch.bounces) + 1;
+            if self.sample.branch(branch.key).get(dimension) >= survival {
                 return;
             }
             throughput /= survival;
         }
         let surface = &hit.surface;
         let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
-        let material = self.context.scene.material_of(hit.object);
         self.stack.push(Branch {
             ray: branch.ray.continue_from(origin, outcome.direction),
             throughput,
-            absorption: optics::absorption_after(material, outcome, surface, branch.absorption),
+            media: outcome.media,
+            wavelength: outcome.wavelength,
             bounces: branch.bounces + 1,
             travelled: branch.travelled + hit.t,
             key: outcome.extend_key(branch.key),
             main,
+            scattered: branch.scattered.map(|s| Scattered { straight: false, ..s }),
         });
     }
 
-    /// At a D: what it emits, the direct light and the photons.
-    fn arrive(&mut self, branch: &Branch, hit: &Hit, albedo: &Texture, sums: &mut PixelSums) {
-        let scene = self.context.scene;
-        let backside = branch.ray.direction.dot(hit.surface.normal) > 0.0;
-        if let Some(light) = scene.objects[hit.object.index()].emitter
-            && !backside
-            && let Some(radiance) = scene.lights[light.index()].surface_radiance()
-        {
-            sums.halves[self.half].classes.add(PathClass::Emitted, branch.throughput * radiance);
-        }
-        let albedo = albedo.eval(hit.surface.uv);
-        if albedo == Vec3::ZERO {
-            return;
-        }
-        // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
-        let weight = branch.throughput * albedo / std::f32::consts::PI;
-        let normal = if backside { -hit.surface.normal } else { hit.surface.normal };
-        let receiver =
-            Receiver { surface: &hit.surface, normal, absorption: branch.absorption, time: branch.ray.time };
-        let sample = self.sample.branch(branch.key);
-        let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
-        sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);
-        let footprint = branch.main && self.view == Some(view_code(hit.sheet, branch.key));
-        if footprint {
-            sums.gain += weight;
-        }
-        match self.lookups {
-            Lookups::Nowhere => {}
-            Lookups::OffFootprint if footprint => {}
-            Lookups::OffFootprint | Lookups::Everywhere => {
-                let caustic = self.look_up(branch, hit, normal);
-                sums.halves[self.half].classes.add(PathClass::Caustic, weight * caustic);
-            }
-        }
+    /// Puts a ray that leaves a D onto the stack.
+    pub(super) fn go_on(&mut self, branch: Branch) {
+        self.stack.push(branch);
     }
 
-    /// Irradiance by density estimation around the point, with a kernel of about a pixel.
-    fn look_up(&mut self, branch: &Branch, hit: &Hit, normal: Vec3) -> Vec3 {
-        let Some(photons) = self.context.photons else { return Vec3::ZERO };
-        let radius = self.context.scene.camera.pixel_width(branch.travelled + hit.t) * self.kernel_pixels;
-        let point = hit.surface.point;
-        let lookup = Lookup { point, normal, sheet: hit.sheet, radius };
-        self.counts.lookups += 1;
-        let irradiance = photons.maps[self.half].irradiance(&lookup).value;
-        if irradiance == Vec3::ZERO {
-            return irradiance;
-        }
-        irradiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius)
+    /// A ray that meets nothing sees the environment. After a D and an S that is the photons' part; after a D alone
+    /// it is the scattered rays' only where highlights are sharp.
+    fn escape(&mut self, branch: &Branch, sums: &mut PixelSums) {
+        let radiance = branch.throughput * self.context.scene.environment;
+        let class = match branch.scattered {
+            None => PathClass::Emitted,
+            Some(Scattered { straight: true, pdf: Some(_), count, .. }) => PathClass::with_light_after(count),
+            Some(_) => return,
+        };
+        sums.halves[self.half].classes.add(class, radiance);
     }
 }

@@ -10,7 +10,7 @@ use super::read::{
     object, optional, or, pair, part, point, real, record, reference, required, seed, slots, tagged,
 };
 use super::shape_file::ShapeFile;
-use super::{LightSampling, Paths, Tone};
+use super::{Highlight, LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
 use std::collections::BTreeSet;
@@ -131,6 +131,8 @@ tagged! {
         "mirror" => Mirror(MirrorFile),
         "metal" => Metal(MetalFile),
         "glass" => Glass(GlassFile),
+        "phong" => Phong(PhongFile),
+        "mix" => Mix(MixFile),
     }
 }
 
@@ -178,7 +180,7 @@ record! {
 }
 
 record! {
-    /// Smooth metal: either `f0`, or `n` and `k`.
+    /// Metal: either `f0`, or `n` and `k`.
     MetalFile {
         /// Fraction of the light reflected at normal incidence; more at an angle by Schlick's approximation.
         f0: Option<[f64; 3]> = optional(color("reflectance").fraction()),
@@ -186,17 +188,78 @@ record! {
         n: Option<[f64; 3]> = optional(color("real part of the index of refraction").up_to(MAX_INDEX)),
         /// Imaginary part of the index of refraction, per channel.
         k: Option<[f64; 3]> = optional(color("imaginary part of the index of refraction").up_to(MAX_INDEX)),
+        /// Roughness: 0 mirrors, 1 is dull. The width of the microfacets' GGX distribution is its square.
+        roughness: f64 = or(real("roughness").between(0.0, 1.0), 0.0),
     }
 }
 
 record! {
-    /// Smooth glass.
+    /// Glass, or a liquid.
     GlassFile {
-        /// Index of refraction.
+        /// Index of refraction; of a glass that disperses light by `abbe`, at the d line (587.6 nm).
         ior: f64 = required(real("index of refraction").above(0.0).at_most(MAX_INDEX)),
         /// Absorption coefficient per channel, m⁻¹: inside, light falls to 1/e over its reciprocal.
         absorption: [f64; 3] = or(color("absorption per metre"), [0.0; 3]),
+        /// Abbe number (n_d - 1) / (n_F - n_C): the smaller, the wider the spectrum. About 64 for crown glass, 36 for
+        /// flint glass, 56 for water.
+        abbe: Option<f64> = optional(real("Abbe number").between(1.0, 1000.0)),
+        /// Terms b and c of Cauchy's equation n = a + b/λ² + c/λ⁴, λ in μm, where a is `ior`; instead of `abbe`.
+        cauchy: Option<[f64; 2]> = optional(pair(real("term of Cauchy's equation").between(0.0, 1.0))),
+        /// Where glass and liquids overlap, the one of the highest priority is what is there; of equal ones the one
+        /// that a ray has entered last. Draw a drink a little into the wall of its glass, and give the glass 1.
+        priority: u32 = or(count("priority", 0, 1000), 0),
+        /// Roughness: 0 is clear, 1 is dull. The width of the microfacets' GGX distribution is its square.
+        roughness: f64 = or(real("roughness").between(0.0, 1.0), 0.0),
     }
+}
+
+record! {
+    /// The illumination equation of Phong and Whitted, term by term: emission + ambient + for each light
+    /// (k_d cos θ + k_s cosⁿ α) + k_r reflection + k_t transmission.
+    PhongFile {
+        /// Radiance of its own, W·sr⁻¹·m⁻²; seen, but not thrown on others.
+        emission: [f64; 3] = or(color("emission"), [0.0; 3]),
+        /// Ambient light, W·sr⁻¹·m⁻².
+        ambient: [f64; 3] = or(color("ambient light"), [0.0; 3]),
+        /// Share of the ambient light that is seen.
+        k_a: [f64; 3] = or(color("share of the ambient light").fraction(), [0.0; 3]),
+        /// Share scattered evenly: the albedo.
+        k_d: AlbedoFile = or(Albedo, AlbedoFile::Color([0.0; 3])),
+        /// Share of the highlight.
+        k_s: [f64; 3] = or(color("share of the highlight").fraction(), [0.0; 3]),
+        /// Sharpness of the highlight.
+        n: f64 = or(real("exponent").between(0.0, 1e5), 20.0),
+        /// The highlight as in the lecture (`lecture`: not weighted by the cosine of incidence, so that a surface lit at
+        /// a slant can reflect more than it receives), or one that never does (`conserving`).
+        highlight: Highlight = or(choice(Highlight::NAMED.to_vec()), Highlight::Lecture),
+        /// Share mirrored.
+        k_r: [f64; 3] = or(color("share mirrored").fraction(), [0.0; 3]),
+        /// Share let through.
+        k_t: [f64; 3] = or(color("share let through").fraction(), [0.0; 3]),
+        /// Index of refraction for what is let through; 1 lets it go straight.
+        ior: f64 = or(real("index of refraction").above(0.0).at_most(MAX_INDEX), 1.0),
+    }
+}
+
+record! {
+    /// So much of one material, and the rest of another.
+    MixFile {
+        /// Name of the first material.
+        first: String = required(reference()),
+        /// Name of the second material.
+        second: String = required(reference()),
+        /// Share of the second: one number for all, or a pattern whose brightness says it.
+        amount: AmountFile = required(Amount),
+    }
+}
+
+/// A number, or a pattern.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum AmountFile {
+    /// The same everywhere.
+    Number(f64),
+    /// The mean of the pattern's channels.
+    Pattern(AlbedoFile),
 }
 
 record! {
@@ -302,6 +365,19 @@ impl Decode for Albedo {
                 object::<PatternFile>().decode(node, cx).map(|p| AlbedoFile::Checker(p.checker))
             }
             _ => color("albedo").fraction().decode(node, cx).map(AlbedoFile::Color),
+        }
+    }
+}
+
+struct Amount;
+
+impl Decode for Amount {
+    type Out = AmountFile;
+
+    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<AmountFile> {
+        match node.value {
+            Value::Object(_) => Albedo.decode(node, cx).map(AmountFile::Pattern),
+            _ => real("share of the second").between(0.0, 1.0).decode(node, cx).map(AmountFile::Number),
         }
     }
 }

@@ -20,7 +20,7 @@ pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
-pub use material::{Conductor, Material, Texture};
+pub use material::{Alpha, Conductor, Dielectric, FRAUNHOFER, Highlight, Ior, Material, Mix, Phong, Texture};
 
 use crate::geometry::{Geometry, Structure};
 use crate::radius::RadiusRule;
@@ -120,16 +120,21 @@ pub enum Paths {
     /// `LS*E|LDS*E|LS+DS*E`: the two passes.
     #[default]
     Caustics,
+    /// `L(D|S)*E`: everything, with the light that bounces between D's.
+    Complete,
 }
 
 impl Paths {
     /// Every value and its name.
-    pub const NAMED: [(&str, Self); 2] = [("whitted", Self::Whitted), ("caustics", Self::Caustics)];
+    pub const NAMED: [(&str, Self); 3] =
+        [("whitted", Self::Whitted), ("caustics", Self::Caustics), ("complete", Self::Complete)];
 }
 
 /// A value of `paths` that does not exist.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is not one of `whitted` (LS*E|LDS*E) and `caustics` (LS*E|LDS*E|LS+DS*E)")]
+#[error(
+    "`{0}` is not one of `whitted` (LS*E|LDS*E), `caustics` (LS*E|LDS*E|LS+DS*E) and `complete` (L(D|S)*E)"
+)]
 pub struct UnknownPaths(String);
 
 impl std::str::FromStr for Paths {

@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use nephroid::geometry::Ray;
 use nephroid::image_io::LinearImage;
 use nephroid::light_path::PathClass;
+use nephroid::media::Media;
 use nephroid::pass2_eye::Footprints;
 use nephroid::photon_map::{Photon, PhotonMap};
 use nephroid::sampling::SamplePoint;
@@ -63,7 +64,7 @@ fn the_layers_add_up_to_the_image() {
 fn footprints_count_every_photon_once() {
     let width = 0.4;
     let scene = compile(&mirrored_light(width, 24));
-    let footprints = Footprints::trace(&scene);
+    let footprints = Footprints::trace(&scene, &Media::default());
     let sheet = scene.geometry.closest_hit(&Ray::new(Vec3::new(0.5, 1.0, 0.0), Vec3::NEG_Y)).unwrap().sheet;
     let half = 0.5 * width as f32 * 0.999;
     let photons: Vec<Photon> = (0..20_000)

@@ -1,8 +1,8 @@
 //! The scene file: what is read, and that every error is found, named and placed.
 
 use nephroid::scene::{
-    AssetError, AssetSource, DirectoryAssets, IssueCode, Light, Material, NoAssets, Paths, Scene,
-    SceneErrors, Stop, Texture, Tone,
+    AssetError, AssetSource, Dielectric, DirectoryAssets, Ior, IssueCode, Light, Material, NoAssets, Paths,
+    Scene, SceneErrors, Stop, Texture, Tone,
 };
 use std::borrow::Cow;
 
@@ -59,7 +59,8 @@ fn a_scene_is_compiled_as_it_is_written() {
         panic!("a checkerboard: {:?}", scene.materials[0])
     };
     assert_eq!((colors[1].to_array(), *size), ([1.0, 1.0, 0.0], 0.5));
-    assert_eq!(scene.materials[2], Material::Glass { ior: 1.5, absorption: glam::Vec3::ZERO });
+    let dielectric = Dielectric { ior: Ior::Constant(1.5), absorption: glam::Vec3::ZERO, priority: 0 };
+    assert_eq!(scene.materials[2], Material::Glass { dielectric, alpha: None });
     assert_eq!(scene.objects[0].name, "ground");
     assert_eq!(scene.objects[1].material.index(), 2);
 }

@@ -4,7 +4,7 @@ use super::spherical_rectangle::SphericalRectangle;
 use super::{Incident, Receiver, short_of};
 use crate::geometry::offset_origin;
 use crate::sampling::{concentric_disc, cone_direction};
-use crate::scene::{DiskLight, LightPoint, MeshLight, QuadLight, SphereLight};
+use crate::scene::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight};
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
@@ -21,7 +21,7 @@ pub(super) fn from_quad(receiver: &Receiver<'_>, quad: &QuadLight, u: Vec2) -> O
     let rectangle = SphericalRectangle::new(quad, from)?;
     let error = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element() * f32::EPSILON;
     let target = LightPoint { point: rectangle.sample(u), normal: quad.normal, error: 4.0 * error };
-    towards(receiver, &target, |_, _| quad.radiance * rectangle.solid_angle)
+    towards(receiver, &target, |_, _| Drawn::new(quad.radiance, 1.0 / rectangle.solid_angle))
 }
 
 /// Uniform in the solid angle of the square around a near disk, where what falls outside the disk gives
@@ -39,12 +39,12 @@ pub(super) fn from_disk(receiver: &Receiver<'_>, disk: &DiskLight, u: Vec2) -> O
             return None;
         }
         let target = disk_point(disk, point);
-        return towards(receiver, &target, |_, _| disk.radiance * rectangle.solid_angle);
+        return towards(receiver, &target, |_, _| Drawn::new(disk.radiance, 1.0 / rectangle.solid_angle));
     }
     let (x, y) = disk.normal.any_orthonormal_pair();
     let p = concentric_disc(u) * disk.radius;
     let target = disk_point(disk, disk.center + x * p.x + y * p.y);
-    towards(receiver, &target, by_area(disk.radiance * disk.area()))
+    towards(receiver, &target, by_area(disk.radiance, disk.area()))
 }
 
 /// A point of a disk light.
@@ -55,20 +55,33 @@ pub(super) fn disk_point(disk: &DiskLight, point: Vec3) -> LightPoint {
 
 /// Uniform in the area of all triangles.
 pub(super) fn from_mesh(receiver: &Receiver<'_>, mesh: &MeshLight, u: Vec2) -> Option<Incident> {
-    towards(receiver, &mesh.sample(u)?, by_area(mesh.radiance * mesh.area()))
+    towards(receiver, &mesh.sample(u)?, by_area(mesh.radiance, mesh.area()))
 }
 
-/// Irradiance before the cosine at the receiver, of a point uniform over a light of this radiance times area.
-pub(super) fn by_area(strength: Vec3) -> impl Fn(f32, f32) -> Vec3 {
-    move |cosine, distance2| strength * (cosine / distance2)
+/// What a drawn direction is worth.
+pub(super) struct Drawn {
+    /// Radiance over density.
+    irradiance: Vec3,
+    /// Density per solid angle.
+    pdf: f32,
 }
 
-/// Toward a point of a light. `strength` of the cosine there and the squared distance is the irradiance before
-/// the cosine at the receiver.
+impl Drawn {
+    fn new(radiance: Vec3, pdf: f32) -> Self {
+        Self { irradiance: radiance / pdf, pdf }
+    }
+}
+
+/// A point uniform over a light's area, by the cosine there and the squared distance.
+pub(super) fn by_area(radiance: Vec3, area: f32) -> impl Fn(f32, f32) -> Drawn {
+    move |cosine, distance2| Drawn::new(radiance, distance2 / (cosine * area))
+}
+
+/// Toward a point of a light. `drawn` is of the cosine there and the squared distance.
 pub(super) fn towards(
     receiver: &Receiver<'_>,
     light: &LightPoint,
-    strength: impl Fn(f32, f32) -> Vec3,
+    drawn: impl Fn(f32, f32) -> Drawn,
 ) -> Option<Incident> {
     let from = receiver.surface.point;
     // A light in whose plane the receiver lies is seen edge-on: what is left of its cosine is rounding.
@@ -79,9 +92,12 @@ pub(super) fn towards(
     let to = target - from;
     let distance2 = to.length_squared();
     let direction = to.try_normalize()?;
-    let (cosine, at_light) = (receiver.normal.dot(direction), -light.normal.dot(direction));
-    let irradiance = strength(at_light.max(0.0), distance2) * cosine;
-    (cosine > 0.0).then_some(Incident { direction, distance: short_of(distance2.sqrt()), irradiance })
+    let at_light = -light.normal.dot(direction);
+    if at_light <= 0.0 || !receiver.faces(direction) {
+        return None;
+    }
+    let Drawn { irradiance, pdf } = drawn(at_light, distance2);
+    Some(Incident { direction, distance: short_of(distance2.sqrt()), irradiance, pdf: Some(pdf) })
 }
 
 /// A direction to the sphere uniform in its solid angle.
@@ -99,16 +115,40 @@ pub(super) fn from_sphere(receiver: &Receiver<'_>, sphere: &SphereLight, u: Vec2
     // 1 - cos without cancellation.
     let height = sine * sine / (1.0 + (1.0 - sine * sine).sqrt());
     let direction = cone_direction(to / distance, height, u);
-    let cosine = receiver.normal.dot(direction.as_vec3());
-    if cosine <= 0.0 {
+    if !receiver.faces(direction.as_vec3()) {
         return None;
     }
     let solid_angle = (2.0 * PI * height) as f32;
     Some(Incident {
         direction: direction.as_vec3(),
         distance: short_of(near_root(to, direction, f64::from(sphere.radius) + rounding) as f32),
-        irradiance: sphere.radiance * (solid_angle * cosine),
+        irradiance: sphere.radiance * solid_angle,
+        pdf: Some(1.0 / solid_angle),
     })
+}
+
+/// Density per solid angle with which the light is sampled from `from` in the direction of a point of its own surface;
+/// `None` for lights that no ray can meet.
+pub(in crate::pass2_eye) fn density_toward(light: &Light, from: Vec3, at: &LightPoint) -> Option<f32> {
+    let to = at.point - from;
+    let distance2 = to.length_squared();
+    let cosine = -at.normal.dot(to) / distance2.sqrt();
+    let over_area = |area: f32| (cosine > 0.0).then(|| distance2 / (cosine * area));
+    let over_rectangle = |quad: &QuadLight| Some(1.0 / SphericalRectangle::new(quad, from)?.solid_angle);
+    match light {
+        Light::Point { .. } | Light::Spot(_) | Light::Directional { .. } => None,
+        Light::Quad(quad) => over_rectangle(quad),
+        Light::Disk(disk) if (from - disk.center).dot(disk.normal) < disk.radius => {
+            over_rectangle(&disk.square())
+        }
+        Light::Disk(disk) => over_area(disk.area()),
+        Light::Mesh(mesh) => over_area(mesh.area()),
+        Light::Sphere(sphere) => {
+            let sine2 = sphere.radius * sphere.radius / (sphere.center - from).length_squared();
+            let height = sine2 / (1.0 + (1.0 - sine2).max(0.0).sqrt());
+            (sine2 < 1.0).then(|| 1.0 / (2.0 * std::f32::consts::PI * height))
+        }
+    }
 }
 
 /// Where a ray that meets a sphere first meets one that is larger by the rounding of both: the ray's end can

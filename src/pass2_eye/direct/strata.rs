@@ -2,9 +2,9 @@
 //! and strata that are divided where their corners disagree. They are kept to be compared with the default.
 
 use super::area::{by_area, disk_point, towards};
-use super::{Incident, Receiver, visible};
+use super::{Incident, Receiver};
 use crate::sampling::{SamplePoint, concentric_disc};
-use crate::scene::{Light, LightPoint, LightSampling, Scene};
+use crate::scene::{Light, LightPoint, LightSampling};
 use glam::{Vec2, Vec3};
 
 /// How often a stratum whose corners disagree is divided in four.
@@ -12,24 +12,25 @@ const DIVISIONS: u32 = 3;
 
 /// A light whose surface is the image of the unit square, equal areas to equal areas.
 pub(super) struct Strata<'a> {
-    pub(super) scene: &'a Scene,
     pub(super) receiver: &'a Receiver<'a>,
     pub(super) light: &'a Light,
     pub(super) shadow_rays: &'a mut u64,
 }
 
 impl Strata<'_> {
-    /// Irradiance of the light by the scene's rule; `None` where that is the default, or the light has no strata.
-    pub(super) fn irradiance(&mut self, sample: SamplePoint) -> Option<Vec3> {
-        if !matches!(self.light, Light::Quad(_) | Light::Disk(_)) {
+    /// Radiance due to the light by the scene's rule; `None` where that is the default, or the light has no strata, or
+    /// the surface has highlights.
+    pub(super) fn radiance(&mut self, sample: SamplePoint) -> Option<Vec3> {
+        if !matches!(self.light, Light::Quad(_) | Light::Disk(_)) || self.receiver.bsdf.albedo().is_none() {
             return None;
         }
-        let across = self.scene.render.light_grid;
+        let render = &self.receiver.scene.render;
+        let across = render.light_grid;
         let size = 1.0 / across as f32;
         let mut sum = Vec3::ZERO;
         for i in 0..across * across {
             let corner = Vec2::new((i % across) as f32, (i / across) as f32) * size;
-            sum += match self.scene.render.light_sampling {
+            sum += match render.light_sampling {
                 LightSampling::Sobol => return None,
                 LightSampling::Grid => self.lit(corner + 0.5 * size),
                 LightSampling::Jittered => {
@@ -49,7 +50,7 @@ impl Strata<'_> {
         let at = |i: u32, size: f32| corner + Vec2::new((i & 1) as f32, (i >> 1) as f32) * size;
         let seen = (0..4).filter(|&i| self.lit(at(i, size)) != Vec3::ZERO).count();
         if seen == 0 || seen == 4 || divisions == 0 {
-            let open = self.incident(corner + 0.5 * size).map_or(Vec3::ZERO, |i| i.irradiance);
+            let open = self.incident(corner + 0.5 * size).map_or(Vec3::ZERO, |i| self.receiver.radiance(&i));
             return open * (seen as f32 / 4.0);
         }
         let half = 0.5 * size;
@@ -58,7 +59,7 @@ impl Strata<'_> {
 
     fn lit(&mut self, u: Vec2) -> Vec3 {
         let incident = self.incident(u);
-        visible(self.scene, self.receiver, incident, self.shadow_rays)
+        self.receiver.visible(incident, self.shadow_rays)
     }
 
     fn incident(&self, u: Vec2) -> Option<Incident> {
@@ -68,13 +69,13 @@ impl Strata<'_> {
                 let point = quad.center + quad.half_u * p.x + quad.half_v * p.y;
                 let largest = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element();
                 let point = LightPoint { point, normal: quad.normal, error: 4.0 * largest * f32::EPSILON };
-                towards(self.receiver, &point, by_area(quad.radiance * quad.area()))
+                towards(self.receiver, &point, by_area(quad.radiance, quad.area()))
             }
             Light::Disk(disk) => {
                 let (x, y) = disk.normal.any_orthonormal_pair();
                 let p = concentric_disc(u) * disk.radius;
                 let point = disk_point(disk, disk.center + x * p.x + y * p.y);
-                towards(self.receiver, &point, by_area(disk.radiance * disk.area()))
+                towards(self.receiver, &point, by_area(disk.radiance, disk.area()))
             }
             Light::Point { .. }
             | Light::Spot(_)

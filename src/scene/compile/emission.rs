@@ -3,11 +3,10 @@
 use super::super::file::ObjectFile;
 use super::super::issue::IssueCode;
 use super::super::shape_file::{PolygonFile, ShapeFile};
-use super::super::{DiskLight, Light, LightId, MeshLight, ObjectId, SphereLight};
+use super::super::{DiskLight, Light, LightId, Material, MeshLight, ObjectId, SphereLight};
 use super::shape::sides;
 use super::{Compiler, vec3};
 use crate::geometry::MeshData;
-use crate::light_path::Bounce;
 use glam::{DVec2, DVec3, Vec3};
 
 impl Compiler<'_> {
@@ -15,9 +14,10 @@ impl Compiler<'_> {
     pub(super) fn emission(&mut self, id: ObjectId, object: &ObjectFile, index: usize) {
         let Some(radiance) = object.emission.map(vec3) else { return };
         let material = self.objects[id.index()].material;
-        let specular = self.materials.get(material.index()).is_some_and(|m| m.bounce() == Bounce::Specular);
+        let specular = self.materials.get(material.index()).is_some_and(Material::has_specular);
         if specular {
-            let message = "a mirror or glass cannot emit: give the object a diffuse material";
+            let message =
+                "what mirrors or lets light through cannot emit: give the object a diffuse material";
             self.issues.add(format!("/objects/{index}/emission"), IssueCode::ConflictingFields, message);
             return;
         }

@@ -1,28 +1,57 @@
 //! Materials of the scene file.
 
-use super::super::file::{AlbedoFile, MaterialFile, MetalFile};
+use super::super::file::{AlbedoFile, AmountFile, GlassFile, MaterialFile, MetalFile, MixFile, PhongFile};
 use super::super::issue::{IssueCode, pointer_step};
-use super::super::{Conductor, Material, Texture};
+use super::super::{Alpha, Conductor, Dielectric, Ior, Material, Mix, Phong, Texture};
 use super::{Compiler, vec3};
+use glam::Vec3;
 
 impl Compiler<'_> {
-    /// A material; `None` if it is wrong, which has then been noted.
+    /// A material that is no mix; `None` if it is wrong, which has then been noted, or a mix.
     pub(super) fn material(&mut self, name: &str, material: &MaterialFile) -> Option<Material> {
         Some(match material {
-            MaterialFile::Diffuse(diffuse) => Material::Diffuse {
-                albedo: match &diffuse.albedo {
-                    AlbedoFile::Color(color) => Texture::Constant(vec3(*color)),
-                    AlbedoFile::Checker(checker) => {
-                        Texture::Checker { colors: checker.colors.map(vec3), size: checker.size as f32 }
-                    }
-                },
-            },
+            MaterialFile::Diffuse(diffuse) => Material::Diffuse { albedo: texture(&diffuse.albedo) },
             MaterialFile::Mirror(mirror) => Material::Mirror { reflectance: vec3(mirror.reflectance) },
-            MaterialFile::Metal(metal) => Material::Metal(self.conductor(name, metal)?),
-            MaterialFile::Glass(glass) => {
-                Material::Glass { ior: glass.ior as f32, absorption: vec3(glass.absorption) }
-            }
+            MaterialFile::Metal(metal) => Material::Metal {
+                conductor: self.conductor(name, metal)?,
+                alpha: Alpha::of_roughness(metal.roughness as f32),
+            },
+            MaterialFile::Glass(glass) => Material::Glass {
+                dielectric: self.dielectric(name, glass)?,
+                alpha: Alpha::of_roughness(glass.roughness as f32),
+            },
+            MaterialFile::Phong(phong) => Material::Phong(Box::new(lecture(phong))),
+            MaterialFile::Mix(_) => return None,
         })
+    }
+
+    /// A mix of two materials that have been compiled.
+    pub(super) fn mix(&mut self, name: &str, mix: &MixFile) -> Option<Material> {
+        let first = self.part(name, "first", &mix.first)?;
+        let second = self.part(name, "second", &mix.second)?;
+        if first.dielectric().is_some() && second.dielectric().is_some() {
+            let message = "a mix cannot have two materials that let light through";
+            self.issues.add(material_field(name, "second"), IssueCode::ConflictingFields, message);
+            return None;
+        }
+        let amount = match &mix.amount {
+            AmountFile::Number(share) => Texture::Constant(Vec3::splat(*share as f32)),
+            AmountFile::Pattern(pattern) => texture(pattern),
+        };
+        Some(Material::Mix(Box::new(Mix { parts: [first, second], amount })))
+    }
+
+    fn part(&mut self, name: &str, field: &str, part: &str) -> Option<Material> {
+        // The reader has refused names that no material has; what is missing here is a mix, or wrong.
+        let id = self.material_ids.get(part)?;
+        match self.materials.get(id.index())? {
+            Material::Mix(_) => {
+                let message = format!("`{part}` is a mix itself: name its parts");
+                self.issues.add(material_field(name, field), IssueCode::ConflictingFields, message);
+                None
+            }
+            material => Some(material.clone()),
+        }
     }
 
     fn conductor(&mut self, name: &str, metal: &MetalFile) -> Option<Conductor> {
@@ -38,8 +67,54 @@ impl Compiler<'_> {
             (None, Some(_), None) => ("k", IssueCode::MissingField, "the field `k` is missing beside `n`"),
             (None, None, Some(_)) => ("n", IssueCode::MissingField, "the field `n` is missing beside `k`"),
         };
-        let pointer = pointer_step(&pointer_step("/materials", name), field);
-        self.issues.add(pointer, code, message);
+        self.issues.add(material_field(name, field), code, message);
         None
     }
+
+    fn dielectric(&mut self, name: &str, glass: &GlassFile) -> Option<Dielectric> {
+        let ior = match (glass.abbe, glass.cauchy) {
+            (None, None) => Ior::Constant(glass.ior as f32),
+            (Some(abbe), None) => Ior::of_abbe(glass.ior, abbe),
+            (None, Some([b, c])) => Ior::Cauchy([glass.ior as f32, b as f32, c as f32]),
+            (Some(_), Some(_)) => {
+                let message = "`cauchy` cannot be given together with `abbe`";
+                self.issues.add(material_field(name, "cauchy"), IssueCode::ConflictingFields, message);
+                return None;
+            }
+        };
+        if ior.is_dispersive() && glass.roughness > 0.0 {
+            let message = "rough glass cannot disperse light: leave out `roughness`, or `abbe` and `cauchy`";
+            self.issues.add(material_field(name, "roughness"), IssueCode::ConflictingFields, message);
+            return None;
+        }
+        let priority = i32::try_from(glass.priority).unwrap_or(i32::MAX);
+        Some(Dielectric { ior, absorption: vec3(glass.absorption), priority })
+    }
+}
+
+fn lecture(phong: &PhongFile) -> Phong {
+    Phong {
+        emission: vec3(phong.emission),
+        ambient: vec3(phong.k_a) * vec3(phong.ambient),
+        k_d: texture(&phong.k_d),
+        k_s: vec3(phong.k_s),
+        exponent: phong.n as f32,
+        highlight: phong.highlight,
+        k_r: vec3(phong.k_r),
+        k_t: vec3(phong.k_t),
+        dielectric: Dielectric { ior: Ior::Constant(phong.ior as f32), absorption: Vec3::ZERO, priority: 0 },
+    }
+}
+
+fn texture(albedo: &AlbedoFile) -> Texture {
+    match albedo {
+        AlbedoFile::Color(color) => Texture::Constant(vec3(*color)),
+        AlbedoFile::Checker(checker) => {
+            Texture::Checker { colors: checker.colors.map(vec3), size: checker.size as f32 }
+        }
+    }
+}
+
+fn material_field(name: &str, field: &str) -> String {
+    pointer_step(&pointer_step("/materials", name), field)
 }

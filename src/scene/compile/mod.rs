@@ -18,6 +18,7 @@ use super::{
     ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Tone,
 };
 use crate::geometry::GeometryBuilder;
+use crate::media::MOST_MATERIALS;
 use glam::{DAffine3, DVec3, Vec3};
 use mesh::MeshLoader;
 use shape::Originals;
@@ -99,12 +100,31 @@ struct Compiler<'f> {
 
 impl<'f> Compiler<'f> {
     fn materials(&mut self, materials: &'f [(String, Option<MaterialFile>)]) {
-        for (name, material) in materials {
-            if let Some(material) = material.as_ref().and_then(|m| self.material(name, m)) {
-                let id = self.add_material(material);
-                self.material_ids.insert(name, id);
+        if materials.len() > MOST_MATERIALS {
+            let message =
+                format!("there are {} materials; at most {MOST_MATERIALS} are told apart", materials.len());
+            self.issues.add("/materials", IssueCode::TooLarge, message);
+            return;
+        }
+        let given = || materials.iter().filter_map(|(name, material)| Some((name, material.as_ref()?)));
+        for (name, material) in given() {
+            if let Some(material) = self.material(name, material) {
+                self.name_material(name, material);
             }
         }
+        // Mixes name others, which may stand behind them.
+        for (name, material) in given() {
+            if let MaterialFile::Mix(mix) = material
+                && let Some(material) = self.mix(name, mix)
+            {
+                self.name_material(name, material);
+            }
+        }
+    }
+
+    fn name_material(&mut self, name: &'f str, material: Material) {
+        let id = self.add_material(material);
+        self.material_ids.insert(name, id);
     }
 
     fn add_material(&mut self, material: Material) -> MaterialId {

@@ -1,0 +1,155 @@
+//! Pass 2 at a D: what it emits, the lights it sees, the photons that rest on it; and, where more is asked for than the
+//! light that comes from the lights or through mirrors and glass, `L(D|S)*DS*DS*E`, a ray that goes on from it.
+
+use super::direct::{Receiver, density_toward, direct_light, power_heuristic};
+use super::footprint::view_code;
+use super::specular::{Branch, EyeWalk, Lookups, Scattered};
+use crate::bsdf::Bsdf;
+use crate::film::PixelSums;
+use crate::geometry::offset_origin;
+use crate::light_path::PathClass;
+use crate::optics::Arrival;
+use crate::photon_map::Lookup;
+use crate::sampling::hash;
+use crate::scene::{LightPoint, Paths};
+use glam::Vec3;
+
+/// Sobol dimensions, of a stream of its own, that draw the direction in which a path goes on, its lobe, and whether.
+const DIRECTION_DIMENSION: u32 = 8;
+const LOBE_DIMENSION: u32 = 10;
+const ROULETTE_DIMENSION: u32 = 11;
+
+/// Tells that stream, and what comes after the D, from the others of an eye sample.
+const AFTER_DIFFUSE: u64 = 0x5eed_0d1f;
+
+/// Photons are looked up over this many times the pixel's width at a D that is seen by another: what is blurred there
+/// is blurred once more by the first.
+const INDIRECT_WIDTH: f32 = 8.0;
+
+/// Paths of fewer D do not play roulette.
+const ROULETTE_AFTER: u32 = 2;
+
+/// More D than this end a path: of albedo 0.9, a hundredth of it is left.
+const MOST_DIFFUSE: u32 = 48;
+
+impl EyeWalk<'_> {
+    /// Adds up what a surface shows; true if it has a D part.
+    pub(super) fn arrive(&mut self, branch: &Branch, arrival: &Arrival<'_>, sums: &mut PixelSums) -> bool {
+        self.see_emitter(branch, arrival, sums);
+        let Some(bsdf) = Bsdf::new(arrival) else { return false };
+        let scene = self.context.scene;
+        let seen = branch.scattered.map_or(0, |s| s.count) + 1;
+        let sample = self.sample.branch(branch.key);
+        let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf: &bsdf, time: branch.ray.time };
+        let direct = direct_light(&receiver, sample, &mut self.counts.shadow_rays);
+        let classes = &mut sums.halves[self.half].classes;
+        classes.add(PathClass::with_light_after(seen), branch.throughput * direct);
+        if seen > 1 {
+            if self.context.photons.is_some() {
+                let radiance = branch.throughput * self.look_up(branch, arrival, &bsdf, INDIRECT_WIDTH);
+                sums.halves[self.half].classes.add(PathClass::Indirect, radiance);
+            }
+        } else {
+            self.see_photons(branch, arrival, &bsdf, sums);
+        }
+        self.leave(branch, arrival, &bsdf, seen);
+        true
+    }
+
+    /// What the surface itself gives, if this estimator is the one that counts it.
+    fn see_emitter(&self, branch: &Branch, arrival: &Arrival<'_>, sums: &mut PixelSums) {
+        let scene = self.context.scene;
+        let surface = &arrival.hit.surface;
+        let classes = &mut sums.halves[self.half].classes;
+        if branch.scattered.is_none() {
+            classes.add(PathClass::Emitted, branch.throughput * arrival.material().glow(surface.uv));
+        }
+        let Some(light) = scene.objects[arrival.hit.object.index()].emitter else { return };
+        let light = &scene.lights[light.index()];
+        let Some(radiance) = light.surface_radiance() else { return };
+        if arrival.direction.dot(surface.normal) > 0.0 {
+            return;
+        }
+        match branch.scattered {
+            None => classes.add(PathClass::Emitted, branch.throughput * radiance),
+            Some(Scattered { straight: true, pdf: Some(pdf), count, point }) => {
+                let at = LightPoint { point: surface.point, normal: surface.normal, error: surface.error };
+                let other = density_toward(light, point, &at).unwrap_or(0.0);
+                let weight = power_heuristic(pdf, other);
+                classes.add(PathClass::with_light_after(count), branch.throughput * radiance * weight);
+            }
+            Some(_) => {}
+        }
+    }
+
+    /// The photons at the first D: counted on the pixel's footprint, if this is it, else looked up.
+    fn see_photons(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, sums: &mut PixelSums) {
+        let footprint = branch.main && self.view == Some(view_code(arrival.hit.sheet, branch.key));
+        if footprint && let Some(albedo) = bsdf.albedo() {
+            // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
+            sums.gain += branch.throughput * albedo / std::f32::consts::PI;
+        }
+        match self.lookups {
+            Lookups::Nowhere => {}
+            Lookups::OffFootprint if footprint => {}
+            Lookups::OffFootprint | Lookups::Everywhere => {
+                let radiance = branch.throughput * self.look_up(branch, arrival, bsdf, 1.0);
+                sums.halves[self.half].classes.add(PathClass::Caustic, radiance);
+            }
+        }
+    }
+
+    /// Radiance by density estimation around the point, with a kernel of about a pixel, times `wider`.
+    fn look_up(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, wider: f32) -> Vec3 {
+        let Some(photons) = self.context.photons else { return Vec3::ZERO };
+        let hit = arrival.hit;
+        let pixel = self.context.scene.camera.pixel_width(branch.travelled + hit.t);
+        let radius = pixel * self.kernel_pixels * wider;
+        let point = hit.surface.point;
+        let lookup =
+            Lookup { point, normal: bsdf.geometric, sheet: hit.sheet, radius, both_sides: bsdf.transmits() };
+        self.counts.lookups += 1;
+        let radiance = photons.maps[self.half].radiance(&lookup, |incident| bsdf.per_irradiance(incident));
+        if radiance == Vec3::ZERO {
+            return radiance;
+        }
+        radiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius)
+    }
+
+    /// Goes on from a D: if all paths are asked for, or if rays are what finds the lights in its highlights.
+    fn leave(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, seen: u32) {
+        let complete = self.context.scene.render.paths == Paths::Complete;
+        let highlights = bsdf.albedo().is_none() && self.context.plan.lights_can_be_met;
+        if !(complete || highlights && seen == 1) || seen >= MOST_DIFFUSE {
+            return;
+        }
+        let stream = self.sample.branch(hash(branch.key, AFTER_DIFFUSE));
+        let Some(scattered) = bsdf.sample(stream.get_2d(DIRECTION_DIMENSION), stream.get(LOBE_DIMENSION))
+        else {
+            return;
+        };
+        let mut throughput = branch.throughput * scattered.weight;
+        if seen > ROULETTE_AFTER {
+            let survival = scattered.weight.max_element().clamp(0.05, 0.95);
+            if stream.get(ROULETTE_DIMENSION) >= survival {
+                return;
+            }
+            throughput /= survival;
+        }
+        let surface = &arrival.hit.surface;
+        let direction = scattered.direction;
+        let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
+        let pdf = bsdf.albedo().is_none().then_some(scattered.pdf);
+        self.go_on(Branch {
+            ray: branch.ray.continue_from(origin, direction),
+            throughput,
+            media: *bsdf.media_toward(direction),
+            bounces: branch.bounces + 1,
+            travelled: branch.travelled + arrival.hit.t,
+            key: hash(branch.key, AFTER_DIFFUSE),
+            main: false,
+            scattered: Some(Scattered { count: seen, point: surface.point, pdf, straight: true }),
+            ..*branch
+        });
+    }
+}
