@@ -9,8 +9,17 @@ use crate::sampling::SamplePoint;
 use crate::scene::{ObjectId, Scene};
 use glam::Vec3;
 
-/// Sobol dimensions 0 to 3 draw the window and the light; each event takes one more.
+/// Sobol dimensions 0 to 3 draw the window and the light; each event takes two more.
 const FIRST_EVENT_DIMENSION: u32 = 4;
+
+/// Dimensions 14 and 15 are what a photon is all along its way, such as its time: events leave them out.
+const WHOLE_WAY: std::ops::Range<u32> = 14..16;
+
+/// The first of the two dimensions of an event.
+fn event_dimension(bounce: u32) -> u32 {
+    let dimension = FIRST_EVENT_DIMENSION + 2 * bounce;
+    if dimension < WHOLE_WAY.start { dimension } else { dimension + 2 }
+}
 
 /// A photon that has met this many S is cut: between two mirrors of reflectance 0.99 it has then lost 92 %.
 const MAX_BOUNCES: u32 = 256;
@@ -69,7 +78,7 @@ pub(super) fn walk(
             tally.energy.stored += power.as_dvec3();
             return Fate::Stored(at_rest(&ray, &hit, power));
         };
-        let u = sample.get(FIRST_EVENT_DIMENSION + 2 * bounce);
+        let u = sample.get(event_dimension(bounce));
         let Some((outcome, weight)) = choose(&interaction, u) else {
             tally.energy.absorbed += power.as_dvec3();
             return Fate::Gone;
@@ -77,7 +86,7 @@ pub(super) fn walk(
         let kept = power * weight;
         tally.energy.absorbed += power.as_dvec3() - kept.as_dvec3();
         power = kept;
-        let u = sample.get(FIRST_EVENT_DIMENSION + 2 * bounce + 1);
+        let u = sample.get(event_dimension(bounce) + 1);
         if !survive(&mut power, first_power, u, tally) {
             return Fate::Gone;
         }

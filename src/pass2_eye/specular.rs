@@ -77,6 +77,9 @@ pub(super) struct EyeWalk<'a> {
     sample: SamplePoint,
     lookups: Lookups,
     view: Option<u32>,
+    /// When it is followed, and whether it adds light straight from the lights.
+    time: f32,
+    direct: bool,
     pub(super) counts: EyeCounts,
 }
 
@@ -108,6 +111,8 @@ impl<'a> EyeWalk<'a> {
             sample,
             lookups: Lookups::Nowhere,
             view: None,
+            time: 0.0,
+            direct: true,
             counts: EyeCounts::default(),
         }
     }
@@ -116,6 +121,22 @@ impl<'a> EyeWalk<'a> {
     pub(super) fn start(&mut self, half: usize, sample: SamplePoint, lookups: Lookups, view: Option<u32>) {
         (self.half, self.sample) = (half, sample);
         (self.lookups, self.view) = (lookups, view);
+        self.time = 0.0;
+    }
+
+    /// Sets when the sample is followed.
+    pub(super) fn at_time(&mut self, time: f32) {
+        self.time = time;
+    }
+
+    /// Adds only what the photons bring along one eye ray to the classes' sums.
+    pub(super) fn trace_caustic(&mut self, raster: Vec2, sums: &mut PixelSums) {
+        let mut all = PixelSums::default();
+        self.direct = false;
+        self.trace(raster, &mut all);
+        self.direct = true;
+        let caustic = all.halves[self.half].classes.get(PathClass::Caustic);
+        sums.halves[self.half].classes.add(PathClass::Caustic, caustic);
     }
 
     /// Adds what arrives along one eye ray to the classes' sums.
@@ -127,7 +148,7 @@ impl<'a> EyeWalk<'a> {
         };
         self.stack.clear();
         self.stack.push(Branch {
-            ray,
+            ray: ray.at_time(self.time),
             throughput: Vec3::ONE,
             absorption: Vec3::ZERO,
             bounces: 0,
@@ -233,8 +254,10 @@ impl<'a> EyeWalk<'a> {
         let receiver =
             Receiver { surface: &hit.surface, normal, absorption: branch.absorption, time: branch.ray.time };
         let sample = self.sample.branch(branch.key);
-        let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
-        sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);
+        if self.direct {
+            let direct = direct_light(scene, &receiver, sample, &mut self.counts.shadow_rays);
+            sums.halves[self.half].classes.add(PathClass::Direct, weight * direct);
+        }
         let footprint = branch.main && self.view == Some(view_code(hit.sheet, branch.key));
         if footprint {
             sums.gain += weight;
@@ -260,6 +283,6 @@ impl<'a> EyeWalk<'a> {
         if irradiance == Vec3::ZERO {
             return irradiance;
         }
-        irradiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius)
+        irradiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius, branch.ray.time)
     }
 }

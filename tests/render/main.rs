@@ -12,6 +12,7 @@ mod geometry_structures;
 mod light_sampling;
 mod lights;
 mod materials;
+mod motion;
 mod optics;
 mod photon_map;
 mod picture;
