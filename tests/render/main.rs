@@ -4,6 +4,7 @@
 
 mod camera;
 mod caustics;
+mod degenerate;
 mod determinism;
 mod direct_light;
 mod geometry;
@@ -18,4 +19,5 @@ mod photon_map;
 mod picture;
 mod plan;
 mod scene_file;
+mod shadows_and_mirrors;
 mod support;
