@@ -8,7 +8,7 @@ use crate::pass2_eye::Footprints;
 use crate::photon_map;
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
-use crate::scene::{Light, LightSampling, Material, Paths, Scene};
+use crate::scene::{Light, LightSampling, Material, Paths, Scene, Warning};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -23,6 +23,8 @@ pub struct Plan {
     pub eye_media: Media,
     /// Whether a ray can meet a light or the environment: highlights are then lit by scattered rays too.
     pub lights_can_be_met: bool,
+    /// True if something moves while the shutter is open.
+    pub moves: bool,
     /// Each choice with its reason.
     pub decisions: Vec<Decision>,
     /// What the user should know.
@@ -42,15 +44,6 @@ pub struct Decision {
     pub choice: String,
     /// Why.
     pub reason: String,
-}
-
-/// Something the user should know, with a stable code.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Warning {
-    /// Stable name of the kind of warning.
-    pub code: &'static str,
-    /// The warning in words.
-    pub message: String,
 }
 
 /// Photons of the first pilot per window; tried again with sixteen times as many where none arrived.
@@ -84,8 +77,9 @@ impl Plan {
             eye_media: Media::around(scene, scene.camera.eye),
             lights_can_be_met: scene.environment != Vec3::ZERO
                 || scene.lights.iter().any(|l| l.surface_radiance().is_some()),
+            moves: scene.geometry.moves(),
             decisions: Vec::new(),
-            warnings: Vec::new(),
+            warnings: scene.warnings.clone(),
             memory_bytes: 0,
         };
         plan.decide_pass_1(scene);
@@ -100,7 +94,7 @@ impl Plan {
             ),
             None => plan.decide("lens", false, "pinhole", "the camera has no aperture: no lens samples"),
         }
-        plan.decide("time", false, "one instant", "nothing moves: no time samples");
+        plan.decide_time();
         plan.decide_colour(scene);
         plan.decide_indirect(scene);
         plan.memory_bytes = plan.estimate_memory(scene);
@@ -118,7 +112,7 @@ impl Plan {
     }
 
     fn warn(&mut self, code: &'static str, message: impl Into<String>) {
-        self.warnings.push(Warning { code, message: message.into() });
+        self.warnings.push(Warning { code, pointer: None, message: message.into() });
     }
 
     fn decide_pass_1(&mut self, scene: &Scene) {
@@ -266,15 +260,28 @@ impl Plan {
         }
     }
 
+    fn decide_time(&mut self) {
+        if self.moves {
+            let choice = "one moment per eye sample, one per round for its photons";
+            self.decide("time", true, choice, "something moves while the shutter is open");
+        } else {
+            self.decide("time", false, "one instant", "nothing moves: no time samples");
+        }
+    }
+
     fn decide_structure(&mut self, scene: &Scene) {
         let structure = scene.geometry.structure();
         let reason = scene.geometry.structure_reason();
         self.decide("structure", structure != "list", structure, reason);
     }
 
-    /// How many doublings of the photons per round memory allows.
+    /// How many doublings of the photons per round memory allows and make sense.
     #[must_use]
     pub fn most_photon_shift(&self) -> u32 {
+        // The photons of a round share one moment: where something moves, many small rounds are worth more.
+        if self.moves {
+            return 0;
+        }
         let photons: u64 = self.photons.iter().map(|b| 1_u64 << b.log2_block).sum();
         MOST_LOG2.saturating_sub(photons.max(1).next_power_of_two().ilog2()).min(MOST_SHIFT)
     }
@@ -308,10 +315,10 @@ fn pilot(scene: &Scene, mut window: Window, index: u64) -> Pilot {
         pass1_light::pilot(scene, window, Block { first: 0, count: 1 << log2, seed })
     };
     let mut log2 = PILOT_LOG2;
-    let (mut tally, mut guide) = run(&window, log2);
+    let (mut tally, mut guide, _) = run(&window, log2);
     if tally.stored == 0 {
         log2 += 4;
-        (tally, guide) = run(&window, log2);
+        (tally, guide, _) = run(&window, log2);
     }
     window.guide = guide;
     Pilot { window, tally, sent: 1 << log2 }

@@ -9,7 +9,7 @@ use crate::pass2_eye::{self, EyeContext, EyeCounts, Footprints};
 use crate::picture::{Picture, PixelError};
 use crate::plan::Plan;
 use crate::radius::RadiusRule;
-use crate::sampling::hash;
+use crate::sampling::{SamplePoint, hash};
 use crate::scene::Scene;
 use crate::smooth::Smoothing;
 use cpu_time::ProcessTime;
@@ -237,7 +237,18 @@ impl Render {
     /// The blocks of the next round: aligned, so that each is a net of its own.
     fn next_blocks(&self) -> Blocks {
         let count = 1 << self.effort.photon_shift;
-        Blocks { first: self.blocks.next_multiple_of(count), count }
+        let times = [0, 1].map(|half| self.moment(half));
+        Blocks { first: self.blocks.next_multiple_of(count), count, times }
+    }
+
+    /// When the photons of the next round fly: stratified over the rounds.
+    fn moment(&self, half: u64) -> f32 {
+        const MOMENTS: u64 = 3;
+        if !self.plan.moves {
+            return 0.0;
+        }
+        let seed = hash(hash(self.scene.render.seed, MOMENTS), half);
+        SamplePoint::new(seed, self.rounds()).get(0)
     }
 
     /// Estimates the error where the number of rounds is a milestone, and decides what the next rounds do.

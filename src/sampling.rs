@@ -6,6 +6,9 @@
 /// Number of dimensions that are low-discrepancy; later ones are independent random numbers.
 pub const SOBOL_DIMENSIONS: u32 = 19;
 
+/// Dimension of a path's time.
+pub const TIME_DIMENSION: u32 = 16;
+
 /// Dimension of a path's wavelength, in either pass.
 pub const WAVELENGTH_DIMENSION: u32 = 17;
 

@@ -1,5 +1,6 @@
 //! Axis-aligned boxes.
 
+use super::{HIT_ROUNDING, Ray};
 use glam::Vec3;
 
 /// An axis-aligned box.
@@ -64,6 +65,25 @@ impl Bounds {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.min.cmpgt(self.max).any()
+    }
+
+    /// True if the ray may meet the box before `t_max`; false is certain.
+    #[must_use]
+    pub fn may_meet(&self, ray: &Ray, t_max: f32) -> bool {
+        let (origin, inverse) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().recip());
+        // In f64 the distances are good to far less than the rounding of the box itself.
+        let slack = f64::from((self.min - ray.origin).abs().max((self.max - ray.origin).abs()).max_element());
+        let slack = slack * f64::from(HIT_ROUNDING);
+        let (mut enter, mut leave) = (0.0_f64, f64::from(t_max));
+        for axis in 0..3 {
+            let low = (f64::from(self.min[axis]) - slack - origin[axis]) * inverse[axis];
+            let high = (f64::from(self.max[axis]) + slack - origin[axis]) * inverse[axis];
+            // Not a number where the ray runs within a plane: that axis says nothing then.
+            if !low.is_nan() && !high.is_nan() {
+                (enter, leave) = (enter.max(low.min(high)), leave.min(low.max(high)));
+            }
+        }
+        enter <= leave
     }
 
     /// The eight corners.

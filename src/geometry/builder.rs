@@ -5,11 +5,14 @@ use super::disk::{Cylinder, Disk};
 use super::instance::{Instance, SharedMesh};
 use super::leaves::{Primitives, Shape, Source};
 use super::mesh::{Mesh, MeshData};
+use super::motion::Motion;
+use super::moving::{Moving, swept_bounds};
 use super::polygon::{Edge, Polygon, PolygonError};
 use super::sphere::Sphere;
 use super::{Bounds, Geometry, Owner};
 use crate::scene::ObjectId;
 use glam::{DAffine3, Vec3};
+use std::sync::Arc;
 
 /// A mesh that instances place into the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,12 +27,38 @@ pub struct GeometryBuilder {
     disks: Vec<Disk>,
     cylinders: Vec<Cylinder>,
     instances: Vec<Instance>,
-    shared: Vec<SharedMesh>,
+    shared: Vec<Arc<SharedMesh>>,
+    moving: Vec<Part>,
     primitives: Primitives,
     owners: Vec<Owner>,
 }
 
+/// Primitives that move together, before their structure is built.
+#[derive(Debug)]
+struct Part {
+    builder: GeometryBuilder,
+    motion: Motion,
+    /// Box over the whole time.
+    bounds: Bounds,
+}
+
 impl GeometryBuilder {
+    /// A builder of primitives that move together; it knows the meshes that this one shares.
+    #[must_use]
+    pub fn part(&self) -> Self {
+        Self { shared: self.shared.clone(), ..Self::default() }
+    }
+
+    /// Adds what was put into a [`GeometryBuilder::part`] of this as one object that moves. Meshes shared there are
+    /// shared here from now on.
+    pub fn moving(&mut self, object: ObjectId, mut part: Self, motion: Motion) {
+        self.shared.clone_from(&part.shared);
+        part.owners.iter_mut().for_each(|owner| owner.object = ObjectId(0));
+        let bounds = swept_bounds(part.bounds_after(0), &motion);
+        self.moving.push(Part { builder: part, motion, bounds });
+        self.other(object, Shape::Moving(self.moving.len() as u32 - 1));
+    }
+
     /// Adds a sphere. The radius is positive.
     pub fn sphere(&mut self, object: ObjectId, center: Vec3, radius: f32) {
         let shape = Shape::Sphere(self.spheres.len() as u32);
@@ -63,7 +92,7 @@ impl GeometryBuilder {
 
     /// Keeps a mesh for instances; by itself it is not in the scene. Indices are in range.
     pub fn share(&mut self, mesh: &MeshData) -> SharedMeshId {
-        self.shared.push(SharedMesh::new(mesh));
+        self.shared.push(Arc::new(SharedMesh::new(mesh)));
         SharedMeshId(self.shared.len() as u32 - 1)
     }
 
@@ -124,7 +153,8 @@ impl GeometryBuilder {
         }
         let (accel, leaves) = Accel::build(structure, &bounds, &self.primitives);
         self.primitives.meshes.iter_mut().for_each(Mesh::settle);
-        Geometry {
+        let parts = std::mem::take(&mut self.moving);
+        let mut geometry = Geometry {
             spheres: self.spheres,
             polygons: self.polygons,
             edges: self.edges,
@@ -133,13 +163,21 @@ impl GeometryBuilder {
             instances: self.instances,
             shared: self.shared,
             meshes: self.primitives.meshes,
+            moving: Vec::new(),
             leaves,
             owners: self.owners,
             count: self.primitives.sources.len(),
             object_bounds,
             accel,
             asked: structure,
+        };
+        let mut first_sheet = geometry.sheet_count();
+        for Part { builder, motion, bounds } in parts {
+            let moving = Moving::new(builder.build_as(structure), motion, bounds, first_sheet);
+            first_sheet = moving.end_of_sheets();
+            geometry.moving.push(moving);
         }
+        geometry
     }
 
     fn bounds_of(&self, source: Source) -> Bounds {
@@ -152,6 +190,7 @@ impl GeometryBuilder {
             Source::Other(Shape::Disk(i)) => self.disks[i as usize].bounds(),
             Source::Other(Shape::Cylinder(i)) => self.cylinders[i as usize].bounds(),
             Source::Other(Shape::Instance(i)) => self.instances[i as usize].bounds(&self.shared),
+            Source::Other(Shape::Moving(i)) => self.moving[i as usize].bounds,
         }
     }
 }

@@ -134,9 +134,13 @@ impl Grid {
         &self.places[self.starts[index] as usize..self.starts[index + 1] as usize]
     }
 
-    /// Finds the nearest hit; `test` tests one primitive.
-    pub(super) fn closest(&self, ray: &Ray, mut test: impl FnMut(Place, &mut Nearest)) -> Nearest {
-        let mut nearest = Nearest::NONE;
+    /// Finds a hit nearer than `nearest`; `test` tests one primitive.
+    pub(super) fn closest(
+        &self,
+        ray: &Ray,
+        mut nearest: Nearest,
+        mut test: impl FnMut(Place, &mut Nearest),
+    ) -> Nearest {
         self.walk(ray, |places, leave| {
             places.iter().for_each(|place| test(*place, &mut nearest));
             f64::from(nearest.t) < leave

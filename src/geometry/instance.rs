@@ -8,6 +8,7 @@ use super::nearest::{Nearest, Place};
 use super::packet::ShearedRay;
 use super::{Bounds, HullPoint, Ray, SurfacePoint};
 use glam::{DAffine3, DMat3, Vec3};
+use std::sync::Arc;
 
 /// A mesh in its own frame.
 #[derive(Debug)]
@@ -67,10 +68,10 @@ impl Instance {
 
     /// Distance in `(0, t_max)` and slot of the nearest triangle.
     #[inline]
-    pub(super) fn intersect(&self, ray: &Ray, t_max: f32, meshes: &[SharedMesh]) -> Option<(f32, u32)> {
+    pub(super) fn intersect(&self, ray: &Ray, t_max: f32, meshes: &[Arc<SharedMesh>]) -> Option<(f32, u32)> {
         let shared = &meshes[self.shared as usize];
         let start = Nearest { t: t_max.min(f32::MAX), ..Nearest::NONE };
-        let nearest = shared.bvh.closest_before(&shared.leaves, &self.local(ray), start, |_, _| {});
+        let nearest = shared.bvh.closest(&shared.leaves, &self.local(ray), start, |_, _| {});
         match nearest.place {
             Some(Place::Triangle(slot)) if nearest.t < t_max => Some((nearest.t, slot)),
             _ => None,
@@ -79,32 +80,21 @@ impl Instance {
 
     /// True if any triangle is hit before `t_max`.
     #[inline]
-    pub(super) fn any(&self, ray: &Ray, t_max: f32, meshes: &[SharedMesh]) -> bool {
+    pub(super) fn any(&self, ray: &Ray, t_max: f32, meshes: &[Arc<SharedMesh>]) -> bool {
         let shared = &meshes[self.shared as usize];
         shared.bvh.any(&shared.leaves, &self.local(ray), t_max, |_| false)
     }
 
     /// The surface where the ray meets the triangle in a slot.
-    pub(super) fn surface(&self, ray: &Ray, slot: u32, meshes: &[SharedMesh]) -> Option<SurfacePoint> {
+    pub(super) fn surface(&self, ray: &Ray, slot: u32, meshes: &[Arc<SharedMesh>]) -> Option<SurfacePoint> {
         let shared = &meshes[self.shared as usize];
         let triangle = shared.leaves.triangle(slot);
         let (_, weights) = triangle.intersect(&ShearedRay::new(&self.local(ray)), f32::INFINITY)?;
         let local = triangle.surface(weights, &shared.mesh.shading(shared.leaves.number(slot)));
-        let point = self.to_world.transform_point3(local.point.as_dvec3()).as_vec3();
-        let m = self.to_world.matrix3;
-        let stretch = (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element() as f32;
-        let turned = |n: Vec3| (self.normals * n.as_dvec3()).normalize_or(n.as_dvec3()).as_vec3();
-        Some(SurfacePoint {
-            point,
-            // What the mesh's frame has, stretched, and rounding to f32.
-            error: local.error * stretch + point.abs().max_element() * f32::EPSILON,
-            normal: turned(local.normal),
-            shading_normal: turned(local.shading_normal),
-            uv: local.uv,
-        })
+        Some(placed(local, &self.to_world, &self.normals))
     }
 
-    pub(super) fn bounds(&self, meshes: &[SharedMesh]) -> Bounds {
+    pub(super) fn bounds(&self, meshes: &[Arc<SharedMesh>]) -> Bounds {
         let local = meshes[self.shared as usize].bounds;
         if local.is_empty() {
             return Bounds::EMPTY;
@@ -119,11 +109,27 @@ impl Instance {
         Bounds::new(world.min - pad, world.max + pad).padded()
     }
 
-    pub(super) fn hull(&self, meshes: &[SharedMesh]) -> impl Iterator<Item = HullPoint> {
+    pub(super) fn hull(&self, meshes: &[Arc<SharedMesh>]) -> impl Iterator<Item = HullPoint> {
         let vertices = meshes[self.shared as usize].mesh.vertices().iter();
         vertices.map(|v| HullPoint {
             position: self.to_world.transform_point3(v.as_dvec3()).as_vec3(),
             radius: 0.0,
         })
+    }
+}
+
+/// A point of a surface, taken from its own frame into the world; `normals` turns its normals.
+pub(super) fn placed(local: SurfacePoint, to_world: &DAffine3, normals: &DMat3) -> SurfacePoint {
+    let point = to_world.transform_point3(local.point.as_dvec3()).as_vec3();
+    let m = to_world.matrix3;
+    let stretch = (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element() as f32;
+    let turned = |n: Vec3| (*normals * n.as_dvec3()).normalize_or(n.as_dvec3()).as_vec3();
+    SurfacePoint {
+        point,
+        // What its own frame has, stretched, and rounding to f32.
+        error: local.error * stretch + point.abs().max_element() * f32::EPSILON,
+        normal: turned(local.normal),
+        shading_normal: turned(local.shading_normal),
+        ..local
     }
 }

@@ -32,6 +32,8 @@ pub(super) enum Shape {
     Disk(u32),
     Cylinder(u32),
     Instance(u32),
+    /// Primitives that move together.
+    Moving(u32),
 }
 
 /// A child of a node in one word.

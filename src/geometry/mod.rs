@@ -9,10 +9,13 @@ mod grid;
 mod instance;
 mod leaves;
 mod mesh;
+mod motion;
+mod moving;
 mod nearest;
 mod packet;
 mod polygon;
 mod ray;
+mod sheets;
 mod simd;
 mod sphere;
 mod sphere_tree;
@@ -21,6 +24,7 @@ pub use accel::Structure;
 pub use bounds::Bounds;
 pub use builder::{GeometryBuilder, SharedMeshId};
 pub use mesh::MeshData;
+pub use motion::{Motion, Turn};
 pub use polygon::PolygonError;
 pub use ray::{Ray, offset_origin};
 pub use sphere::roots as sphere_roots;
@@ -32,10 +36,12 @@ use glam::{Vec2, Vec3};
 use instance::{Instance, SharedMesh};
 use leaves::{Child, Entry, Leaves, Run, Shape, Word};
 use mesh::Mesh;
+use moving::Moving;
 use nearest::{Nearest, Place};
 use packet::ShearedRay;
 use polygon::{Edge, Polygon};
 use sphere::Sphere;
+use std::sync::Arc;
 
 /// How far computed hits may lie off their primitive, as a multiple of the rounding of the largest coordinate
 /// in the frame of the ray: three for the corners' place across the ray, nine for the distance along it, and
@@ -51,8 +57,9 @@ pub struct Geometry {
     disks: Vec<Disk>,
     cylinders: Vec<Cylinder>,
     instances: Vec<Instance>,
-    shared: Vec<SharedMesh>,
+    shared: Vec<Arc<SharedMesh>>,
     meshes: Vec<Mesh>,
+    moving: Vec<Moving>,
     /// The primitives in the order of the structure.
     leaves: Leaves,
     /// Whose each primitive is, in the order of their numbers.
@@ -124,19 +131,33 @@ impl Geometry {
     /// The first surface along the ray.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        self.hit(ray, &self.nearest(ray, Nearest::NONE))
+    }
+
+    /// Finds a hit nearer than `start`.
+    #[inline]
+    fn nearest(&self, ray: &Ray, start: Nearest) -> Nearest {
         let others = |run: Run, nearest: &mut Nearest| self.closest_of_run(run, ray, nearest);
-        let nearest = match &self.accel {
-            Accel::List(words) => self.closest_of_list(words, ray),
-            Accel::Bvh(bvh) => bvh.closest(&self.leaves, ray, others),
+        match &self.accel {
+            Accel::List(words) => self.closest_of_list(words, ray, start),
+            Accel::Bvh(bvh) => bvh.closest(&self.leaves, ray, start, others),
             Accel::Grid(grid) => {
                 let sheared = ShearedRay::new(ray);
-                grid.closest(ray, |place, nearest| self.closest_of_place(place, ray, &sheared, nearest))
+                grid.closest(ray, start, |place, nearest| {
+                    self.closest_of_place(place, ray, &sheared, nearest);
+                })
             }
             Accel::Spheres(tree) => {
                 let sheared = ShearedRay::new(ray);
-                tree.closest(ray, |place, nearest| self.closest_of_place(place, ray, &sheared, nearest))
+                tree.closest(ray, start, |place, nearest| {
+                    self.closest_of_place(place, ray, &sheared, nearest);
+                })
             }
-        };
+        }
+    }
+
+    /// What is hit there.
+    fn hit(&self, ray: &Ray, nearest: &Nearest) -> Option<Hit> {
         let place = nearest.place?;
         let owner = self.owner(nearest.primitive);
         let surface = match place {
@@ -145,11 +166,19 @@ impl Geometry {
                 Shape::Polygon(i) => self.polygons[i as usize].surface(ray, nearest.t),
                 Shape::Disk(i) => self.disks[i as usize].surface(ray),
                 Shape::Cylinder(i) => self.cylinders[i as usize].surface(ray),
+                Shape::Moving(i) => {
+                    let hit = self.moving[i as usize].hit(ray, nearest.t)?;
+                    return Some(Hit { object: owner.object, ..hit });
+                }
                 Shape::Instance(_) => return None,
             },
             Place::Instance(entry, slot) => match self.leaves.entries[entry as usize].shape {
                 Shape::Instance(i) => self.instances[i as usize].surface(ray, slot, &self.shared)?,
-                Shape::Sphere(_) | Shape::Polygon(_) | Shape::Disk(_) | Shape::Cylinder(_) => return None,
+                Shape::Sphere(_)
+                | Shape::Polygon(_)
+                | Shape::Disk(_)
+                | Shape::Cylinder(_)
+                | Shape::Moving(_) => return None,
             },
             Place::Triangle(slot) => {
                 let triangle = self.leaves.triangle(slot);
@@ -201,9 +230,8 @@ impl Geometry {
         }
     }
 
-    fn closest_of_list(&self, words: &[Word], ray: &Ray) -> Nearest {
+    fn closest_of_list(&self, words: &[Word], ray: &Ray, mut nearest: Nearest) -> Nearest {
         let sheared = ShearedRay::new(ray);
-        let mut nearest = Nearest::NONE;
         for word in words {
             match word.child() {
                 Child::Packet(index) => {
@@ -236,6 +264,7 @@ impl Geometry {
                 }
                 Shape::Disk(i) => (self.disks[i as usize].intersect(ray, t_max), Place::Entry(index)),
                 Shape::Cylinder(i) => (self.cylinders[i as usize].intersect(ray, t_max), Place::Entry(index)),
+                Shape::Moving(i) => (self.moving[i as usize].intersect(ray, t_max), Place::Entry(index)),
                 Shape::Instance(i) => {
                     let hit = self.instances[i as usize].intersect(ray, t_max, &self.shared);
                     (hit.map(|(t, _)| t), Place::Instance(index, hit.map_or(0, |(_, slot)| slot)))
@@ -260,6 +289,7 @@ impl Geometry {
             Shape::Disk(i) => self.disks[i as usize].intersect(ray, t_max).is_some(),
             Shape::Cylinder(i) => self.cylinders[i as usize].intersect(ray, t_max).is_some(),
             Shape::Instance(i) => self.instances[i as usize].any(ray, t_max, &self.shared),
+            Shape::Moving(i) => self.moving[i as usize].any(ray, t_max),
         }
     }
 
@@ -269,44 +299,13 @@ impl Geometry {
         self.owners[after - 1]
     }
 
-    /// What has a border is a sheet of its own, since each clips the kernel at its own outline; an object's
-    /// triangles form one sheet, and a sphere is one. Polygons come first, then disks, cylinders and objects.
-    fn sheet(&self, place: Place, object: ObjectId) -> SheetId {
-        let (polygons, disks) = (self.polygons.len() as u32, self.disks.len() as u32);
-        let rest = polygons + disks + self.cylinders.len() as u32 + object.0;
-        SheetId(match place {
-            Place::Entry(entry) => match self.leaves.entries[entry as usize].shape {
-                Shape::Polygon(i) => i,
-                Shape::Disk(i) => polygons + i,
-                Shape::Cylinder(i) => polygons + disks + i,
-                Shape::Sphere(_) | Shape::Instance(_) => rest,
-            },
-            Place::Triangle(_) | Place::Instance(..) => rest,
-        })
-    }
-
-    /// Share of the density estimate's kernel around `point` that lies on the sheet (1 where unknown).
-    #[must_use]
-    pub fn kernel_mass(&self, sheet: SheetId, point: Vec3, radius: f32) -> f32 {
-        let index = sheet.0 as usize;
-        if let Some(polygon) = self.polygons.get(index) {
-            return polygon.kernel_mass(point, radius, &self.edges);
-        }
-        let index = index - self.polygons.len();
-        if let Some(disk) = self.disks.get(index) {
-            return disk.kernel_mass(point, radius);
-        }
-        let cylinder = self.cylinders.get(index - self.disks.len());
-        cylinder.map_or(1.0, |cylinder| cylinder.kernel_mass(point, radius))
-    }
-
-    /// Box of one object.
+    /// Box of one object, over the whole time that the shutter is open.
     #[must_use]
     pub fn object_bounds(&self, object: ObjectId) -> Bounds {
         self.object_bounds.get(object.index()).copied().unwrap_or(Bounds::EMPTY)
     }
 
-    /// Points and spheres whose convex hull holds the object.
+    /// Points and spheres whose convex hull holds the object while the shutter is open.
     #[must_use]
     pub fn hull(&self, object: ObjectId) -> Vec<HullPoint> {
         let mut hull = Vec::new();
@@ -320,6 +319,7 @@ impl Geometry {
                 Shape::Disk(i) => hull.extend(self.disks[i as usize].hull()),
                 Shape::Cylinder(i) => hull.extend(self.cylinders[i as usize].hull()),
                 Shape::Instance(i) => hull.extend(self.instances[i as usize].hull(&self.shared)),
+                Shape::Moving(i) => hull.extend(self.moving[i as usize].hull()),
             }
         }
         for owner in self.owners.iter().filter(|o| o.object == object) {
@@ -339,7 +339,20 @@ impl Geometry {
     /// Number of primitives.
     #[must_use]
     pub fn primitive_count(&self) -> usize {
-        self.count
+        // Each thing that moves is one primitive of the structure.
+        self.count - self.moving.len() + self.moving.iter().map(Moving::primitive_count).sum::<usize>()
+    }
+
+    /// True if anything moves while the shutter is open.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.moving.iter().any(Moving::moves)
+    }
+
+    /// True if the ray may meet, before `t_max`, something that moves, at any time; false is certain.
+    #[must_use]
+    pub fn may_meet_moving(&self, ray: &Ray, t_max: f32) -> bool {
+        self.moving.iter().any(|moving| moving.moves() && moving.bounds().may_meet(ray, t_max))
     }
 
     /// The structure a ray is tested against, in words.
@@ -357,15 +370,21 @@ impl Geometry {
     /// Bytes held by the primitives and the structure.
     #[must_use]
     pub fn memory_bytes(&self) -> u64 {
+        let shared = self.shared.iter().map(|mesh| mesh.memory_bytes()).sum::<usize>();
+        (shared + self.own_memory_bytes()) as u64
+    }
+
+    /// Without the meshes that instances share.
+    fn own_memory_bytes(&self) -> usize {
         let arrays = size_of_val(&self.spheres[..])
             + size_of_val(&self.polygons[..])
             + size_of_val(&self.edges[..])
             + size_of_val(&self.disks[..])
             + size_of_val(&self.cylinders[..])
             + size_of_val(&self.instances[..])
-            + self.shared.iter().map(SharedMesh::memory_bytes).sum::<usize>()
+            + self.moving.iter().map(Moving::memory_bytes).sum::<usize>()
             + size_of_val(&self.owners[..])
             + self.meshes.iter().map(Mesh::memory_bytes).sum::<usize>();
-        (arrays + self.leaves.memory_bytes() + self.accel.memory_bytes()) as u64
+        arrays + self.leaves.memory_bytes() + self.accel.memory_bytes()
     }
 }

@@ -69,9 +69,13 @@ impl SphereTree {
         self.subtree(high);
     }
 
-    /// Finds the nearest hit; `test` tests one primitive.
-    pub(super) fn closest(&self, ray: &Ray, mut test: impl FnMut(Place, &mut Nearest)) -> Nearest {
-        let mut nearest = Nearest::NONE;
+    /// Finds a hit nearer than `nearest`; `test` tests one primitive.
+    pub(super) fn closest(
+        &self,
+        ray: &Ray,
+        mut nearest: Nearest,
+        mut test: impl FnMut(Place, &mut Nearest),
+    ) -> Nearest {
         self.walk(ray, |leaf| {
             leaf.iter().for_each(|place| test(*place, &mut nearest));
             Some(nearest.t)

@@ -14,11 +14,12 @@ pub use window::{Region, Source, Window, windows};
 
 use crate::photon_map::{Photon, PhotonMap};
 use crate::render::{Control, RenderError};
-use crate::sampling::{SamplePoint, hash};
-use crate::scene::Scene;
+use crate::sampling::{SamplePoint, TIME_DIMENSION, hash};
+use crate::scene::{ObjectId, Scene};
 use guide::Lesson;
 use rayon::prelude::*;
-use walk::PhotonWalk;
+use std::collections::BTreeSet;
+use walk::{PhotonWalk, Step};
 
 /// Photons traced between two looks at the cancel flag; also the unit of parallel work.
 const BATCH: u32 = 4096;
@@ -36,17 +37,22 @@ pub struct Budget {
 pub struct RoundPhotons {
     /// One map per half.
     pub maps: [PhotonMap; 2],
+    /// When the photons of each half have flown.
+    pub times: [f32; 2],
     /// Energy per window, summed over both halves (each half carries the window's whole flux).
     pub tallies: Vec<Tally>,
 }
 
 /// Which points of the windows' sequences a round takes, in blocks of the plan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blocks {
     /// Blocks to leave out: earlier rounds had them. A multiple of the count.
     pub first: u32,
     /// Number of blocks, a power of two.
     pub count: u32,
+    /// When the photons of each half fly: where they rest on something that moves is where it is then. Halves have
+    /// times of their own, so that their difference shows also the noise of these.
+    pub times: [f32; 2],
 }
 
 /// Traces a round's blocks of each window's two scrambled sequences.
@@ -71,7 +77,7 @@ pub fn emit_photons(
             total.add(tally);
         }
     }
-    Ok(RoundPhotons { maps: [a, b], tallies: sum })
+    Ok(RoundPhotons { maps: [a, b], times: blocks.times, tallies: sum })
 }
 
 fn emit_half(
@@ -87,7 +93,8 @@ fn emit_half(
         let size = 1_u32 << budget.log2_block;
         let seed = window_seed(scene.render.seed, index, half);
         let block = Block { first: blocks.first.wrapping_mul(size), count: blocks.count * size, seed };
-        let (mut found, tally) = trace_block(scene, &budget.window, block, control)?;
+        let time = blocks.times[half as usize];
+        let (mut found, tally) = trace_block_at(scene, &budget.window, (block, time), control)?;
         photons.append(&mut found);
         tallies.push(tally);
     }
@@ -111,8 +118,8 @@ pub struct Block {
     pub seed: u64,
 }
 
-/// Traces a block of photons through one window; the result is in the order of the points, whatever the
-/// number of threads.
+/// Traces a block of photons through one window when the shutter opens; the result is in the order of the points,
+/// whatever the number of threads.
 ///
 /// # Errors
 /// [`RenderError::Cancelled`] if the control says so.
@@ -122,13 +129,23 @@ pub fn trace_block(
     block: Block,
     control: &Control,
 ) -> Result<(Vec<Photon>, Tally), RenderError> {
+    trace_block_at(scene, window, (block, 0.0), control)
+}
+
+/// [`trace_block`] at another time.
+fn trace_block_at(
+    scene: &Scene,
+    window: &Window,
+    (block, time): (Block, f32),
+    control: &Control,
+) -> Result<(Vec<Photon>, Tally), RenderError> {
     let emission = Emission::new(scene, window);
     let batches = (0..block.count.div_ceil(BATCH))
         .into_par_iter()
         .map(|batch| {
             control.check()?;
             let end = ((batch + 1) * BATCH).min(block.count);
-            Ok(trace_batch(scene, &emission, block, batch * BATCH..end))
+            Ok(trace_batch(scene, &emission, (block, time), batch * BATCH..end))
         })
         .collect::<Result<Vec<_>, RenderError>>()?;
     let mut photons = Vec::with_capacity(batches.iter().map(|(p, _)| p.len()).sum());
@@ -143,7 +160,7 @@ pub fn trace_block(
 fn trace_batch(
     scene: &Scene,
     emission: &Emission,
-    block: Block,
+    (block, time): (Block, f32),
     points: std::ops::Range<u32>,
 ) -> (Vec<Photon>, Tally) {
     let walk = PhotonWalk::new(scene, emission.window());
@@ -155,30 +172,41 @@ fn trace_batch(
         tally.sent += 1;
         let Some(mut photon) = emission.sample(sample) else { continue };
         photon.power *= share;
+        photon.ray.time = time;
         tally.energy.emitted += photon.power.as_dvec3();
-        walk.trace(photon, sample, &mut tally, |resting| photons.push(resting));
+        walk.trace(photon, sample, &mut tally, |step| match step {
+            Step::Rests(photon) => photons.push(photon),
+            Step::Meets(_) => {}
+        });
     }
     (photons, tally)
 }
 
-/// Sends a block of pilot photons through a window, and learns where those come from that arrive.
+/// Sends a block of pilot photons through a window, and learns where those come from that arrive, and which S they
+/// meet.
 #[must_use]
-pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Guide>) {
+pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Guide>, BTreeSet<ObjectId>) {
     let emission = Emission::new(scene, window);
     let walk = PhotonWalk::new(scene, window);
     let mut lesson = Lesson::new();
+    let mut met = BTreeSet::new();
     let mut tally = Tally::default();
     for i in 0..block.count {
         let sample = SamplePoint::new(block.seed, block.first.wrapping_add(i));
         tally.sent += 1;
         let Some(mut photon) = emission.sample(sample) else { continue };
         photon.power /= block.count as f32;
+        // A table serves all rounds: it is learned over the whole time that the shutter is open.
+        photon.ray.time = sample.get(TIME_DIMENSION);
         tally.energy.emitted += photon.power.as_dvec3();
         let mut power = 0.0;
-        walk.trace(photon, sample, &mut tally, |resting| power += resting.power.element_sum());
+        walk.trace(photon, sample, &mut tally, |step| match step {
+            Step::Rests(photon) => power += photon.power.element_sum(),
+            Step::Meets(object) => _ = met.insert(object),
+        });
         if power > 0.0 {
             lesson.delivered(sample.get_2d(0), power);
         }
     }
-    (tally, lesson.learn())
+    (tally, lesson.learn(), met)
 }

@@ -21,6 +21,14 @@ const MAX_BOUNCES: u32 = 256;
 /// Below this fraction of its first power a photon plays roulette for its life.
 const ROULETTE_BELOW: f32 = 0.05;
 
+/// What happens to a photon on its way.
+pub(super) enum Step {
+    /// It goes on from an S.
+    Meets(ObjectId),
+    /// It comes to rest on a D.
+    Rests(Photon),
+}
+
 /// Sends photons on their way through a scene.
 pub(super) struct PhotonWalk<'a> {
     scene: &'a Scene,
@@ -36,13 +44,13 @@ impl<'a> PhotonWalk<'a> {
         Self { scene, caster: window.caster, media: window.media }
     }
 
-    /// Traces one photon; gives `store` what rests on a D. On what is D and S, light rests and goes on.
+    /// Traces one photon and tells what happens to it. On what is D and S, light rests and goes on.
     pub(super) fn trace(
         &self,
         photon: EmittedPhoton,
         sample: SamplePoint,
         tally: &mut Tally,
-        mut store: impl FnMut(Photon),
+        mut tell: impl FnMut(Step),
     ) {
         let EmittedPhoton { mut ray, mut power } = photon;
         let first_power = power.max_element();
@@ -78,7 +86,7 @@ impl<'a> PhotonWalk<'a> {
                 let resting = power * (Vec3::ONE - interaction.share());
                 tally.stored += 1;
                 tally.energy.stored += resting.as_dvec3();
-                store(at_rest(&ray, &hit, power));
+                tell(Step::Rests(at_rest(&ray, &hit, power)));
                 power -= resting;
             }
             let dimension = event_dimension(FIRST_EVENT_DIMENSION, bounce);
@@ -86,6 +94,7 @@ impl<'a> PhotonWalk<'a> {
                 tally.energy.absorbed += power.as_dvec3();
                 return;
             };
+            tell(Step::Meets(hit.object));
             let kept = left * weight;
             tally.energy.absorbed += power.as_dvec3() - kept.as_dvec3();
             power = kept;

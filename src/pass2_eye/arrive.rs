@@ -41,9 +41,11 @@ impl EyeWalk<'_> {
         let seen = branch.scattered.map_or(0, |s| s.count) + 1;
         let sample = self.sample.branch(branch.key);
         let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf: &bsdf, time: branch.ray.time };
-        let direct = direct_light(&receiver, sample, &mut self.counts.shadow_rays);
-        let classes = &mut sums.halves[self.half].classes;
-        classes.add(PathClass::with_light_after(seen), branch.throughput * direct);
+        if self.direct {
+            let direct = direct_light(&receiver, sample, &mut self.counts.shadow_rays);
+            let classes = &mut sums.halves[self.half].classes;
+            classes.add(PathClass::with_light_after(seen), branch.throughput * direct);
+        }
         if seen > 1 {
             if self.context.photons.is_some() {
                 let radiance = branch.throughput * self.look_up(branch, arrival, &bsdf, INDIRECT_WIDTH);
@@ -113,7 +115,7 @@ impl EyeWalk<'_> {
         if radiance == Vec3::ZERO {
             return radiance;
         }
-        radiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius)
+        radiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius, branch.ray.time)
     }
 
     /// Goes on from a D: if all paths are asked for, or if rays are what finds the lights in its highlights.

@@ -1,5 +1,8 @@
 //! Pass 2, `DS*E`: the area of each pixel on the surface that the eye's main way leads to.
 //!
+//! Where the way meets nothing that moves, the light that falls there is the mean over all times; a pixel that sees
+//! what moves has no footprint.
+//!
 //! A pixel's share of a caustic is the light that falls on its footprint. The pixels' corners are traced once
 //! along the main way, refracted where that is possible; the four landing points of a pixel bound its footprint,
 //! and neighbours share them, so that every photon falls on exactly one pixel: nothing is blurred, and the even
@@ -163,6 +166,9 @@ fn land(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
     let mut only_way = true;
     for _ in 0..MOST_BOUNCES {
         let hit = scene.geometry.closest_hit(&ray)?;
+        if scene.geometry.may_meet_moving(&ray, hit.t) {
+            return None;
+        }
         let arrival = Arrival::new(scene, &hit, ray.direction, &media, None);
         let interaction = arrival.interact(|| UNDISPERSED);
         let material = arrival.material();

@@ -13,7 +13,7 @@ use crate::film::{Film, PixelSums, RoundFilm};
 use crate::pass1_light::RoundPhotons;
 use crate::plan::Plan;
 use crate::render::{Control, RenderError};
-use crate::sampling::{SamplePoint, hash};
+use crate::sampling::{SamplePoint, TIME_DIMENSION, hash};
 use crate::scene::Scene;
 use glam::Vec2;
 use rayon::prelude::*;
@@ -124,8 +124,21 @@ fn trace_pixel(
             let sample = SamplePoint::new(seed, first.wrapping_add(i));
             let raster = Vec2::new(x as f32, y as f32) + sample.get_2d(0);
             let lookups = if i < gathering { lookups } else { Lookups::Nowhere };
-            walk.start(half as usize, sample, lookups, footprint.map(|f| f.view));
+            let view = footprint.map(|f| f.view);
+            if !context.plan.moves {
+                walk.start(half as usize, sample, lookups, view);
+                walk.trace(raster, &mut sums);
+                continue;
+            }
+            // Every sample sees the lights at a moment of its own; photons lie where things are at theirs.
+            walk.start(half as usize, sample, Lookups::Nowhere, view);
+            walk.at_time(sample.get(TIME_DIMENSION));
             walk.trace(raster, &mut sums);
+            if let Some(photons) = context.photons.filter(|_| lookups != Lookups::Nowhere) {
+                walk.start(half as usize, sample, lookups, view);
+                walk.at_time(photons.times[half as usize]);
+                walk.trace_caustic(raster, &mut sums);
+            }
         }
     }
     sums

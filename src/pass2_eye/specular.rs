@@ -75,6 +75,9 @@ pub(super) struct EyeWalk<'a> {
     pub(super) sample: SamplePoint,
     pub(super) lookups: Lookups,
     pub(super) view: Option<u32>,
+    /// When it is followed, and whether it adds light straight from the lights.
+    pub(super) time: f32,
+    pub(super) direct: bool,
     pub(super) counts: EyeCounts,
 }
 
@@ -124,6 +127,8 @@ impl<'a> EyeWalk<'a> {
             sample,
             lookups: Lookups::Nowhere,
             view: None,
+            time: 0.0,
+            direct: true,
             counts: EyeCounts::default(),
         }
     }
@@ -132,6 +137,22 @@ impl<'a> EyeWalk<'a> {
     pub(super) fn start(&mut self, half: usize, sample: SamplePoint, lookups: Lookups, view: Option<u32>) {
         (self.half, self.sample) = (half, sample);
         (self.lookups, self.view) = (lookups, view);
+        self.time = 0.0;
+    }
+
+    /// Sets when the sample is followed.
+    pub(super) fn at_time(&mut self, time: f32) {
+        self.time = time;
+    }
+
+    /// Adds only what the photons bring along one eye ray to the classes' sums.
+    pub(super) fn trace_caustic(&mut self, raster: Vec2, sums: &mut PixelSums) {
+        let mut all = PixelSums::default();
+        self.direct = false;
+        self.trace(raster, &mut all);
+        self.direct = true;
+        let caustic = all.halves[self.half].classes.get(PathClass::Caustic);
+        sums.halves[self.half].classes.add(PathClass::Caustic, caustic);
     }
 
     /// Adds what arrives along one eye ray to the classes' sums.
@@ -143,7 +164,7 @@ impl<'a> EyeWalk<'a> {
         };
         self.stack.clear();
         self.stack.push(Branch {
-            ray,
+            ray: ray.at_time(self.time),
             throughput: Vec3::ONE,
             media: self.context.plan.eye_media,
             wavelength: None,

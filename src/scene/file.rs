@@ -9,7 +9,7 @@ use super::read::{
     Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, name, named, note_duplicates,
     object, optional, or, pair, part, point, real, record, reference, required, seed, slots, tagged,
 };
-use super::shape_file::ShapeFile;
+use super::shape_file::{MotionFile, ShapeFile};
 use super::{Highlight, LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
@@ -100,6 +100,8 @@ record! {
         target: [f64; 3] = required(point()),
         /// The direction that is up in the picture.
         up: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
+        /// When the shutter opens and closes, in seconds: what moves meanwhile is blurred.
+        shutter: [f64; 2] = or(pair(real("time in seconds")), [0.0, 0.0]),
         /// Vertical field of view in degrees.
         fov: f64 = required(real("vertical field of view in degrees").above(0.0).below(180.0)),
         /// Diameter of the lens in metres; 0 is a pinhole.
@@ -119,6 +121,8 @@ record! {
         target: [f64; 3] = required(point()),
         /// The direction that is up in the picture.
         up: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
+        /// When the shutter opens and closes, in seconds: what moves meanwhile is blurred.
+        shutter: [f64; 2] = or(pair(real("time in seconds")), [0.0, 0.0]),
         /// Height of what is seen, in metres.
         height: f64 = required(real("height in metres").positive_length()),
     }
@@ -272,8 +276,12 @@ record! {
         /// Radiance of its front, W·sr⁻¹·m⁻²: the outside of a sphere, the side of a polygon or mesh from which
         /// its vertices run anticlockwise. Makes the object a light; it still reflects by its material.
         emission: Option<[f64; 3]> = optional(color("emission")),
+        /// Its velocity, m/s: it moves on a straight line while the camera's `shutter` is open.
+        velocity: [f64; 3] = or(point(), [0.0; 3]),
+        /// How it moves while the camera's `shutter` is open, besides by its `velocity`.
+        motion: Option<MotionFile> = optional(object::<MotionFile>()),
         ..
-        /// Its shape.
+        /// Its shape, where it is when the shutter opens if it has a `motion`, at time 0 if it has a `velocity`.
         shape: ShapeFile
     }
 }

@@ -5,6 +5,7 @@
 
 pub mod assets;
 mod camera;
+mod check;
 mod compile;
 mod file;
 mod issue;
@@ -18,6 +19,7 @@ mod shape_file;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection};
+pub use check::Warning;
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
 pub use material::{Alpha, Conductor, Dielectric, FRAUNHOFER, Highlight, Ior, Material, Mix, Phong, Texture};
@@ -76,6 +78,8 @@ pub struct Scene {
     pub environment: Vec3,
     /// What the file asks of the renderer.
     pub render: RenderSettings,
+    /// What is allowed, but hardly meant.
+    pub warnings: Vec<Warning>,
 }
 
 /// One named thing of the scene file (or the surface of a light).

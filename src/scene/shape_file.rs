@@ -81,7 +81,23 @@ record! {
 }
 
 record! {
-    /// A rotation about an axis through the origin.
+    /// The pose when the shutter closes, relative to that when it opens. In between, the angle and all else grow
+    /// evenly.
+    MotionFile {
+        /// By how much it is moved.
+        translate: [f64; 3] = or(point(), [0.0; 3]),
+        /// By how much it is turned; several turns are possible.
+        rotate: Option<RotateFile> = optional(object::<RotateFile>()),
+        /// By how much it is scaled, in all or along each of the axes.
+        scale: [f64; 3] = or(Scale, [1.0; 3]),
+        /// The point about which it is turned and scaled, and which is only moved. If left out, that is for an
+        /// instance its `translate`, for other objects the middle of their box.
+        about: Option<[f64; 3]> = optional(point()),
+    }
+}
+
+record! {
+    /// A rotation about an axis, through the origin unless another point is named.
     RotateFile {
         /// The axis.
         axis: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),

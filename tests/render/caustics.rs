@@ -173,7 +173,7 @@ fn t27_a_ball_lens_focuses_the_known_flux() {
 /// together are all light. A point light 200 away stands in for the sun (its light misses h uniform by 1e-5),
 /// and a diffuse shell around both catches everything.
 #[test]
-fn t28_the_orders_of_a_ball_carry_the_known_energy() {
+fn t28_f73_the_orders_of_a_ball_carry_the_known_energy() {
     const DISTANCE: f64 = 200.0;
     let ball = json!({ "type": "sphere", "material": "glass", "center": [0, 0, 0], "radius": 1 });
     let shell = json!({ "type": "sphere", "material": "floor", "center": [0, 0, 0], "radius": 300 });

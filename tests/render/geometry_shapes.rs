@@ -116,14 +116,14 @@ fn the_kernels_mass_near_a_rim_is_right() {
             let point = Vec3::new(distance as f32, 0.0, 0.0);
             let ray = Ray::new(point * 0.999 + Vec3::Y, Vec3::NEG_Y);
             let sheet = disk.closest_hit(&ray).unwrap().sheet;
-            let mass = f64::from(disk.kernel_mass(sheet, point, radius as f32));
+            let mass = f64::from(disk.kernel_mass(sheet, point, radius as f32, 0.0));
             let right = sum(&|a, b| (a * radius).hypot(distance + b * radius) <= 1.0);
             assert!((mass - right).abs() < 3e-3, "disk {radius} {distance}: {mass} {right}");
             let height = 1.0 - distance;
             let point = Vec3::new(1000.0, height as f32, 0.0);
             let ray = Ray::new(Vec3::new(2000.0, 0.5, 0.0), Vec3::NEG_X);
             let sheet = cylinder.closest_hit(&ray).unwrap().sheet;
-            let mass = f64::from(cylinder.kernel_mass(sheet, point, radius as f32));
+            let mass = f64::from(cylinder.kernel_mass(sheet, point, radius as f32, 0.0));
             let right = sum(&|_, b| (0.0..=1.0).contains(&(height + b * radius)));
             assert!((mass - right).abs() < 3e-3, "cylinder {radius} {distance}: {mass} {right}");
         }

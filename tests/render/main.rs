@@ -4,6 +4,7 @@
 
 mod camera;
 mod caustics;
+mod degenerate;
 mod determinism;
 mod direct_light;
 mod geometry;
@@ -12,9 +13,11 @@ mod geometry_structures;
 mod light_sampling;
 mod lights;
 mod materials;
+mod motion;
 mod optics;
 mod photon_map;
 mod picture;
 mod plan;
 mod scene_file;
+mod shadows_and_mirrors;
 mod support;

@@ -179,7 +179,7 @@ const BAD_SCENES: &[(&str, &str, &str, IssueCode)] = &[
 ];
 
 #[test]
-fn each_error_is_found_at_its_place() {
+fn f3_f6_f10_f11_f30_f71_f72_f76_each_error_is_found_at_its_place() {
     for (from, to, pointer, code) in BAD_SCENES.iter().copied() {
         let errors = errors(&changed(from, to));
         assert!(places(&errors).contains(&(pointer, code)), "{to}: expected {pointer} {code}, got\n{errors}");
@@ -250,7 +250,7 @@ fn a_wrong_byte_anywhere_causes_no_panic() {
 }
 
 #[test]
-fn extreme_numbers_anywhere_cause_no_panic() {
+fn f76_extreme_numbers_anywhere_cause_no_panic() {
     let is_number = |c: char| c.is_ascii_digit() || ['.', '-'].contains(&c);
     let starts: Vec<usize> = BASE
         .char_indices()
@@ -271,7 +271,7 @@ fn extreme_numbers_anywhere_cause_no_panic() {
 }
 
 #[test]
-fn whatever_is_not_a_scene_is_refused() {
+fn f76_whatever_is_not_a_scene_is_refused() {
     for text in ["", " ", "null", "1", "\"\"", "[]", "{}", "\u{feff}", "[[[[", "{\"a\":{\"a\":", "\0"] {
         errors(text);
     }
@@ -320,7 +320,7 @@ fn a_mesh_may_be_an_asset() {
 }
 
 #[test]
-fn bad_assets_are_errors_at_the_field_that_names_them() {
+fn f36_bad_assets_are_errors_at_the_field_that_names_them() {
     for obj in [
         "v 0 0 0\nv 1 0 0\nv 0 1 0\n",
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",

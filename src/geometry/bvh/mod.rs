@@ -38,20 +38,9 @@ impl Bvh {
         size_of_val(&self.nodes[..])
     }
 
-    /// Finds the nearest hit. `others` tests a run of primitives that are not triangles.
+    /// Finds a hit nearer than `nearest`. `others` tests a run of primitives that are not triangles.
     #[inline]
     pub(super) fn closest(
-        &self,
-        leaves: &Leaves,
-        ray: &Ray,
-        others: impl FnMut(Run, &mut Nearest),
-    ) -> Nearest {
-        self.closest_before(leaves, ray, Nearest::NONE, others)
-    }
-
-    /// Finds a hit nearer than `nearest`.
-    #[inline]
-    pub(super) fn closest_before(
         &self,
         leaves: &Leaves,
         ray: &Ray,

@@ -6,6 +6,7 @@ mod emission;
 mod light;
 mod material;
 mod mesh;
+mod motion;
 mod polygon;
 mod shape;
 
@@ -15,7 +16,7 @@ use super::issue::{IssueCode, Issues, SceneErrors};
 use super::json::{ParseError, ParseErrorKind, parse};
 use super::shape_file::ShapeFile;
 use super::{
-    ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Tone,
+    ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Tone, Warning,
 };
 use crate::geometry::GeometryBuilder;
 use crate::media::MOST_MATERIALS;
@@ -63,9 +64,14 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         objects: Vec::new(),
         geometry: GeometryBuilder::default(),
         lights: Vec::new(),
+        shutter: [0.0; 2],
+        warnings: Vec::new(),
     };
     let image = image_settings(file.image.as_ref().and_then(Option::as_ref));
-    let camera = file.camera.as_ref().and_then(|camera| compiler.camera(camera, image));
+    let camera = file.camera.as_ref().and_then(|camera| {
+        compiler.shutter(camera);
+        compiler.camera(camera, image)
+    });
     compiler.materials(file.materials.as_deref().unwrap_or_default());
     compiler.objects(file.objects.as_deref().unwrap_or_default());
     compiler.lights(file.lights.as_deref().unwrap_or_default());
@@ -83,6 +89,7 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         lights: compiler.lights,
         environment: file.environment.as_ref()?.as_ref().map_or(Vec3::ZERO, |e| vec3(e.radiance)),
         render: render?,
+        warnings: compiler.warnings,
     })
 }
 
@@ -96,6 +103,9 @@ struct Compiler<'f> {
     objects: Vec<Object>,
     geometry: GeometryBuilder,
     lights: Vec<Light>,
+    /// When the shutter opens and closes, s.
+    shutter: [f64; 2],
+    warnings: Vec<Warning>,
 }
 
 impl<'f> Compiler<'f> {
@@ -127,6 +137,10 @@ impl<'f> Compiler<'f> {
         self.material_ids.insert(name, id);
     }
 
+    fn warn(&mut self, code: &'static str, pointer: &str, message: impl Into<String>) {
+        self.warnings.push(Warning { code, pointer: Some(pointer.to_owned()), message: message.into() });
+    }
+
     fn add_material(&mut self, material: Material) -> MaterialId {
         let id = MaterialId(self.materials.len() as u32);
         self.materials.push(material);
@@ -140,7 +154,7 @@ impl<'f> Compiler<'f> {
             let material = self.material_ids.get(object.material.as_str()).copied().unwrap_or(MaterialId(0));
             let name = object.name.clone().unwrap_or_else(|| format!("objects/{index}"));
             let id = self.add_object(Object { name, material, emitter: None });
-            self.shape(id, &object.shape, index);
+            self.place_object(id, object, index);
             self.emission(id, object, index);
         }
     }
