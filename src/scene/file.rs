@@ -6,13 +6,16 @@ use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
 use super::light_file::LightFile;
 use super::read::{
-    Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, name, named, note_duplicates,
-    object, optional, or, pair, part, point, real, record, reference, required, seed, slots, tagged,
+    Context, Decode, Fields, MAX_LENGTH, MIN_LENGTH, choice, color, count, direction, name, named,
+    note_duplicates, object, optional, or, pair, part, point, real, record, reference, required, seed, slots,
+    tagged,
 };
+use super::schema::Definitions;
 use super::shape_file::ShapeFile;
 use super::{LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
+use serde_json::json;
 use std::collections::BTreeSet;
 
 /// The version of the format that is read.
@@ -46,7 +49,8 @@ fn material_names<'n>(root: &'n Node<'_>) -> BTreeSet<&'n str> {
 }
 
 record! {
-    /// A whole scene. A part that was wrong is `None` (and has been noted), so that the others can be checked.
+    // A part that was wrong is `None` (and has been noted), so that the others can be checked.
+    /// A whole scene.
     SceneFile {
         /// Version of the format.
         nephroid: Option<()> = part(required(Version)),
@@ -76,9 +80,9 @@ record! {
         width: u32 = or(count("width in pixels", 1, MAX_IMAGE_SIDE), 640),
         /// Pixels down.
         height: u32 = or(count("height in pixels", 1, MAX_IMAGE_SIDE), 480),
-        /// Exposure in stops.
-        exposure: f64 = or(real("exposure in stops").between(-64.0, 64.0), 0.0),
-        /// Curve between linear radiance and the display.
+        /// Exposure: the picture is multiplied by 2 to the power of it.
+        exposure: f64 = or(real("exposure in stops").between(-64.0, 64.0).unit("stops"), 0.0),
+        /// Curve between linear radiance and the display: clipped at 1, or with highlights rolled off.
         tone: Tone = or(choice(vec![("linear", Tone::Linear), ("filmic", Tone::Filmic)]), Tone::Linear),
     }
 }
@@ -101,9 +105,9 @@ record! {
         /// The direction that is up in the picture.
         up: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
         /// Vertical field of view in degrees.
-        fov: f64 = required(real("vertical field of view in degrees").above(0.0).below(180.0)),
+        fov: f64 = required(real("vertical field of view in degrees").above(0.0).below(180.0).unit("°")),
         /// Diameter of the lens in metres; 0 is a pinhole.
-        aperture: f64 = or(real("diameter of the lens in metres").between(0.0, MAX_LENGTH), 0.0),
+        aperture: f64 = or(real("diameter of the lens in metres").between(0.0, MAX_LENGTH).unit("m"), 0.0),
         /// Distance from the lens, along the view, of the plane that is sharp, in metres; that of the target if
         /// left out.
         focus_distance: Option<f64> = optional(real("distance in metres").positive_length()),
@@ -165,7 +169,7 @@ record! {
         /// Colours of the even and the odd squares.
         colors: [[f64; 3]; 2] = required(pair(color("albedo").fraction())),
         /// Side of a square, in texture coordinates (metres on a polygon).
-        size: f64 = required(real("side of a square").positive_length()),
+        size: f64 = required(real("side of a square").between(MIN_LENGTH, MAX_LENGTH)),
     }
 }
 
@@ -195,7 +199,7 @@ record! {
         /// Index of refraction.
         ior: f64 = required(real("index of refraction").above(0.0).at_most(MAX_INDEX)),
         /// Absorption coefficient per channel, m⁻¹: inside, light falls to 1/e over its reciprocal.
-        absorption: [f64; 3] = or(color("absorption per metre"), [0.0; 3]),
+        absorption: [f64; 3] = or(color("absorption per metre").unit("m⁻¹"), [0.0; 3]),
     }
 }
 
@@ -206,9 +210,9 @@ record! {
         name: Option<String> = optional(name()),
         /// Name of its material.
         material: String = required(reference()),
-        /// Radiance of its front, W·sr⁻¹·m⁻²: the outside of a sphere, the side of a polygon or mesh from which
+        /// Radiance of its front: the outside of a sphere, the side of a polygon or mesh from which
         /// its vertices run anticlockwise. Makes the object a light; it still reflects by its material.
-        emission: Option<[f64; 3]> = optional(color("emission")),
+        emission: Option<[f64; 3]> = optional(color("emission").unit("W·sr⁻¹·m⁻²")),
         ..
         /// Its shape.
         shape: ShapeFile
@@ -218,23 +222,25 @@ record! {
 record! {
     /// What surrounds the scene.
     EnvironmentFile {
-        /// Radiance, the same from everywhere, W·sr⁻¹·m⁻².
-        radiance: [f64; 3] = required(color("radiance")),
+        /// Radiance, the same from everywhere.
+        radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
     }
 }
 
 record! {
     /// What is asked of the renderer.
     RenderFile {
-        /// Which light paths are computed.
+        /// Which light paths are computed: `whitted` is LS*E and LDS*E, `caustics` also LS+DS*E.
         paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
-        /// When the render ends.
+        /// When the render ends; at an error of 0.02 or after 60 seconds if left out.
         stop: Option<StopFile> = optional(object::<StopFile>()),
         /// Radius of the caustics' density estimate: a pixel, or shrinking from round to round.
         radius: RadiusRule = or(choice(RadiusRule::NAMED.to_vec()), RadiusRule::Pixel),
         /// The structure that finds what a ray meets; all find the same.
         structure: Structure = or(choice(Structure::NAMED.to_vec()), Structure::Auto),
-        /// How quad and disk lights are sampled.
+        /// How quad and disk lights are sampled: by one point per eye sample (`sobol`), or by the squares of a grid,
+        /// at their centres (`grid`), at a random point of each (`jittered`), or at their corners, divided where those
+        /// disagree (`adaptive`).
         light_sampling: LightSampling = or(choice(LightSampling::NAMED.to_vec()), LightSampling::Sobol),
         /// Squares along each side of such a light, unless it is sampled by `sobol`.
         light_grid: u32 = or(count("squares along each side of a light", 1, 64), LIGHT_GRID),
@@ -260,10 +266,10 @@ impl Default for RenderFile {
 record! {
     /// When a render ends: the first limit that is reached.
     StopFile {
-        /// Estimated relative error.
+        /// Estimated relative error: 0.02 is 2 %.
         error: Option<f64> = optional(real("relative error (0.02 is 2 %)").above(0.0).at_most(1.0)),
         /// Seconds of rendering.
-        seconds: Option<f64> = optional(real("seconds").above(0.0).at_most(1e9)),
+        seconds: Option<f64> = optional(real("seconds").above(0.0).at_most(1e9).unit("s")),
         /// Number of rounds.
         rounds: Option<u32> = optional(count("number of rounds", 1, u32::MAX)),
     }
@@ -289,6 +295,10 @@ impl Decode for Version {
             }
         }
     }
+
+    fn schema(&self, _definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "const": VERSION as u32 })
+    }
 }
 
 struct Albedo;
@@ -303,5 +313,10 @@ impl Decode for Albedo {
             }
             _ => color("albedo").fraction().decode(node, cx).map(AlbedoFile::Color),
         }
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        let color = color("albedo").fraction().schema(definitions);
+        json!({ "anyOf": [color, object::<PatternFile>().schema(definitions)] })
     }
 }

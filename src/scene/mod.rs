@@ -14,6 +14,7 @@ mod light_file;
 mod material;
 mod mesh_file;
 mod read;
+mod schema;
 mod shape_file;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
@@ -21,6 +22,7 @@ pub use camera::{Camera, Lens, Projection};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
 pub use material::{Conductor, Material, Texture};
+pub use schema::{schema, schema_markdown};
 
 use crate::geometry::{Geometry, Structure};
 use crate::radius::RadiusRule;

@@ -2,9 +2,11 @@
 
 use super::json::{Node, Value};
 use super::read::{
-    Context, Decode, direction, list, name, object, optional, or, point, real, record, required, scale,
-    scale3, size2, size3, tagged, triangle, uv,
+    Context, Decode, Encode, direction, list, name, object, optional, or, point, real, record, required,
+    scale, scale3, size2, size3, tagged, triangle, uv,
 };
+use super::schema::Definitions;
+use serde_json::json;
 
 tagged! {
     /// A shape.
@@ -62,7 +64,7 @@ record! {
         /// Its extent along x and z.
         size: [f64; 2] = required(size2()),
         /// Rows from low to high z, each from low to high x: heights above the centre.
-        heights: Vec<Vec<f64>> = required(list(2, list(2, real("height in metres")))),
+        heights: Vec<Vec<f64>> = required(list(2, list(2, real("height in metres").unit("m")))),
     }
 }
 
@@ -86,7 +88,7 @@ record! {
         /// The axis.
         axis: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
         /// Degrees, anticlockwise seen against the axis.
-        angle: f64 = required(real("angle in degrees").between(-3600.0, 3600.0)),
+        angle: f64 = required(real("angle in degrees").between(-3600.0, 3600.0).unit("°")),
     }
 }
 
@@ -137,5 +139,15 @@ impl Decode for Scale {
             Value::Array(_) => scale3().decode(node, cx),
             _ => scale().decode(node, cx).map(|s| [s; 3]),
         }
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "anyOf": [scale().schema(definitions), scale3().schema(definitions)] })
+    }
+}
+
+impl Encode for Scale {
+    fn encode(&self, value: &[f64; 3]) -> serde_json::Value {
+        scale3().encode(value)
     }
 }

@@ -17,4 +17,5 @@ mod photon_map;
 mod picture;
 mod plan;
 mod scene_file;
+mod schema;
 mod support;
