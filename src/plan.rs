@@ -259,7 +259,7 @@ impl Plan {
         let passing =
             if self.photons.is_empty() { 2 * film } else { (2 * film).max(pixels * SMOOTHING_BYTES) };
         let footprints = if self.photons.is_empty() { 0 } else { pixels * Footprints::BYTES_PER_PIXEL };
-        scene.geometry.memory_bytes() + film + footprints + passing + photons * per_photon
+        scene.geometry.memory_bytes() + scene.image_bytes + film + footprints + passing + photons * per_photon
     }
 }
 

@@ -3,10 +3,10 @@
 //! Each type here is the one declaration of its JSON: field names, types, limits, defaults.
 
 use super::issue::{IssueCode, Issues};
-use super::json::{Node, Value};
+use super::json::{Member, Node, Value};
 use super::light_file::LightFile;
 use super::read::{
-    Context, Decode, Fields, MAX_LENGTH, MIN_LENGTH, choice, color, count, direction, name, named,
+    Context, Decode, Fields, MAX_LENGTH, MIN_LENGTH, Scale, choice, color, count, direction, name, named,
     note_duplicates, object, optional, or, pair, part, point, real, record, reference, required, seed, slots,
     tagged,
 };
@@ -153,10 +153,12 @@ pub(super) enum AlbedoFile {
     Color([f64; 3]),
     /// `{"checker": {…}}`.
     Checker(CheckerFile),
+    /// `{"image": …}`.
+    Image(ImageTextureFile),
 }
 
 record! {
-    /// What stands in an albedo that is an object.
+    /// A pattern in the place of a colour.
     PatternFile {
         /// A checkerboard.
         checker: CheckerFile = required(object::<CheckerFile>()),
@@ -164,12 +166,25 @@ record! {
 }
 
 record! {
-    /// A checkerboard.
+    /// A checkerboard. Texture coordinates u and v, of which v points up: on a polygon and on each side of a box
+    /// metres from the first corner, u along the first edge; on a disk metres from its centre; on a height field
+    /// metres; on a sphere and a cylinder once around and from bottom to top 0 to 1, u to the right seen from
+    /// outside; on a mesh its own.
     CheckerFile {
         /// Colours of the even and the odd squares.
         colors: [[f64; 3]; 2] = required(pair(color("albedo").fraction())),
         /// Side of a square, in texture coordinates (metres on a polygon).
         size: f64 = required(real("side of a square").between(MIN_LENGTH, MAX_LENGTH)),
+    }
+}
+
+record! {
+    /// A picture in the place of a colour; it repeats on all sides. The checker says what the coordinates are.
+    ImageTextureFile {
+        /// A PNG or JPEG file, sRGB; transparency is left out.
+        image: String = required(name()),
+        /// Width and height of one copy of the picture in texture coordinates (metres on a polygon).
+        scale: [f64; 2] = or(Scale, [1.0; 2]),
     }
 }
 
@@ -307,9 +322,17 @@ impl Decode for Albedo {
     type Out = AlbedoFile;
 
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<AlbedoFile> {
-        match node.value {
-            Value::Object(_) => {
+        let has = |members: &[Member<'_>], name| members.iter().any(|member| member.key == name);
+        match &node.value {
+            Value::Object(members) if has(members, "image") => {
+                object::<ImageTextureFile>().decode(node, cx).map(AlbedoFile::Image)
+            }
+            Value::Object(members) if has(members, "checker") => {
                 object::<PatternFile>().decode(node, cx).map(|p| AlbedoFile::Checker(p.checker))
+            }
+            Value::Object(_) => {
+                cx.issue(IssueCode::MissingField, "expected a field `checker` or `image`");
+                None
             }
             _ => color("albedo").fraction().decode(node, cx).map(AlbedoFile::Color),
         }
@@ -317,6 +340,7 @@ impl Decode for Albedo {
 
     fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
         let color = color("albedo").fraction().schema(definitions);
-        json!({ "anyOf": [color, object::<PatternFile>().schema(definitions)] })
+        let checker = object::<PatternFile>().schema(definitions);
+        json!({ "anyOf": [color, checker, object::<ImageTextureFile>().schema(definitions)] })
     }
 }

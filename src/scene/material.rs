@@ -1,7 +1,8 @@
 //! Materials: what a surface does to light, and whether that is a D or an S of the path notation.
 
+use super::Texture;
 use crate::light_path::Bounce;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// What a surface is made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,20 +42,6 @@ pub enum Conductor {
     },
 }
 
-/// A colour over a surface.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Texture {
-    /// The same everywhere.
-    Constant(Vec3),
-    /// A checkerboard in the surface's uv coordinates (metres on a polygon).
-    Checker {
-        /// Colours of the even and the odd squares.
-        colors: [Vec3; 2],
-        /// Side of a square, in uv units.
-        size: f32,
-    },
-}
-
 impl Material {
     /// Whether a path that meets this surface has met a D or an S.
     #[must_use]
@@ -62,32 +49,6 @@ impl Material {
         match self {
             Self::Diffuse { .. } => Bounce::Diffuse,
             Self::Mirror { .. } | Self::Metal(_) | Self::Glass { .. } => Bounce::Specular,
-        }
-    }
-}
-
-impl Texture {
-    /// The colour at a surface point.
-    #[inline]
-    #[must_use]
-    pub fn eval(&self, uv: Vec2) -> Vec3 {
-        match self {
-            Self::Constant(color) => *color,
-            Self::Checker { colors, size } => {
-                let square = (uv / *size).floor();
-                // Parity of the sum; rem_euclid keeps it right for negative squares.
-                let odd = (square.x + square.y).rem_euclid(2.0) >= 1.0;
-                colors[usize::from(odd)]
-            }
-        }
-    }
-
-    /// True if no light is ever reflected.
-    #[must_use]
-    pub fn is_black(&self) -> bool {
-        match self {
-            Self::Constant(color) => *color == Vec3::ZERO,
-            Self::Checker { colors, .. } => colors.iter().all(|c| *c == Vec3::ZERO),
         }
     }
 }

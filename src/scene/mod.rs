@@ -16,13 +16,15 @@ mod mesh_file;
 mod read;
 mod schema;
 mod shape_file;
+mod texture;
 
-pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
+pub use assets::{AssetError, AssetSource, DirectoryAssets, MemoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
-pub use material::{Conductor, Material, Texture};
+pub use material::{Conductor, Material};
 pub use schema::{schema, schema_markdown};
+pub use texture::{Texture, TextureImage};
 
 use crate::geometry::{Geometry, Structure};
 use crate::radius::RadiusRule;
@@ -76,6 +78,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Radiance of the constant environment, W·sr⁻¹·m⁻².
     pub environment: Vec3,
+    /// Bytes of the pictures that textures and environment are made of.
+    pub image_bytes: u64,
     /// What the file asks of the renderer.
     pub render: RenderSettings,
 }

@@ -1,12 +1,9 @@
 //! The shapes of the scene file: exactly what the JSON says, nothing computed.
 
-use super::json::{Node, Value};
 use super::read::{
-    Context, Decode, Encode, direction, list, name, object, optional, or, point, real, record, required,
-    scale, scale3, size2, size3, tagged, triangle, uv,
+    Scale, direction, list, name, object, optional, or, point, real, record, required, size2, size3, tagged,
+    triangle, uv,
 };
-use super::schema::Definitions;
-use serde_json::json;
 
 tagged! {
     /// A shape.
@@ -125,29 +122,5 @@ record! {
         normals: Option<Vec<[f64; 3]>> = optional(list(3, direction())),
         /// Texture coordinates per vertex.
         uvs: Option<Vec<[f64; 2]>> = optional(list(3, uv())),
-    }
-}
-
-/// One scale, or one for each axis.
-struct Scale;
-
-impl Decode for Scale {
-    type Out = [f64; 3];
-
-    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<[f64; 3]> {
-        match node.value {
-            Value::Array(_) => scale3().decode(node, cx),
-            _ => scale().decode(node, cx).map(|s| [s; 3]),
-        }
-    }
-
-    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
-        json!({ "anyOf": [scale().schema(definitions), scale3().schema(definitions)] })
-    }
-}
-
-impl Encode for Scale {
-    fn encode(&self, value: &[f64; 3]) -> serde_json::Value {
-        scale3().encode(value)
     }
 }

@@ -19,3 +19,4 @@ mod plan;
 mod scene_file;
 mod schema;
 mod support;
+mod textures;

@@ -1,8 +1,8 @@
 //! Materials of the scene file.
 
-use super::super::file::{AlbedoFile, MaterialFile, MetalFile};
+use super::super::file::{MaterialFile, MetalFile};
 use super::super::issue::{IssueCode, pointer_step};
-use super::super::{Conductor, Material, Texture};
+use super::super::{Conductor, Material};
 use super::{Compiler, vec3};
 
 impl Compiler<'_> {
@@ -10,12 +10,8 @@ impl Compiler<'_> {
     pub(super) fn material(&mut self, name: &str, material: &MaterialFile) -> Option<Material> {
         Some(match material {
             MaterialFile::Diffuse(diffuse) => Material::Diffuse {
-                albedo: match &diffuse.albedo {
-                    AlbedoFile::Color(color) => Texture::Constant(vec3(*color)),
-                    AlbedoFile::Checker(checker) => {
-                        Texture::Checker { colors: checker.colors.map(vec3), size: checker.size as f32 }
-                    }
-                },
+                albedo: self
+                    .texture(&diffuse.albedo, &format!("{}/albedo", pointer_step("/materials", name)))?,
             },
             MaterialFile::Mirror(mirror) => Material::Mirror { reflectance: vec3(mirror.reflectance) },
             MaterialFile::Metal(metal) => Material::Metal(self.conductor(name, metal)?),

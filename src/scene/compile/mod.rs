@@ -8,6 +8,7 @@ mod material;
 mod mesh;
 mod polygon;
 mod shape;
+mod texture;
 
 use super::assets::AssetSource;
 use super::file::{ImageFile, MaterialFile, ObjectFile, RenderFile, SceneFile, StopFile, read_scene_file};
@@ -22,9 +23,10 @@ use glam::{DAffine3, DVec3, Vec3};
 use mesh::MeshLoader;
 use shape::Originals;
 use std::collections::HashMap;
+use texture::TextureLoader;
 
 impl Scene {
-    /// Reads and compiles a scene file; `assets` gives the meshes that it names.
+    /// Reads and compiles a scene file; `assets` gives the files that it names.
     ///
     /// # Errors
     /// Everything that is wrong with the scene, at once.
@@ -56,6 +58,7 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
     let mut compiler = Compiler {
         issues,
         meshes: MeshLoader::new(assets),
+        textures: TextureLoader::new(assets),
         originals: Originals::new(file.objects.as_deref().unwrap_or_default()),
         material_ids: HashMap::new(),
         materials: Vec::new(),
@@ -81,14 +84,19 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         geometry: compiler.geometry.build_as(render.as_ref()?.structure),
         lights: compiler.lights,
         environment: file.environment.as_ref()?.as_ref().map_or(Vec3::ZERO, |e| vec3(e.radiance)),
+        image_bytes: compiler.textures.memory_bytes(),
         render: render?,
     })
 }
+
+/// Why an asset is refused.
+type Refusal = (IssueCode, String);
 
 /// The scene while it grows.
 struct Compiler<'f> {
     issues: &'f mut Issues,
     meshes: MeshLoader<'f>,
+    textures: TextureLoader<'f>,
     originals: Originals<'f>,
     material_ids: HashMap<&'f str, MaterialId>,
     materials: Vec<Material>,

@@ -12,7 +12,7 @@ mod structure;
 
 pub(super) use color::color;
 pub(super) use numbers::{
-    MAX_LENGTH, MIN_LENGTH, count, direction, pair, point, real, scale, scale3, seed, size2, size3, uv,
+    MAX_LENGTH, MIN_LENGTH, Scale, count, direction, pair, point, real, seed, size2, size3, uv,
 };
 pub(super) use structure::{
     choice, list, name, named, object, optional, or, part, reference, required, slots, triangle,

@@ -300,14 +300,43 @@ impl Encode for Direction {
     }
 }
 
-/// A factor by which something is scaled.
-pub(in crate::scene) fn scale() -> Real {
-    real("scale").between(1e-6, 1e6)
+/// One factor, or one for each of `N` axes.
+pub(in crate::scene) struct Scale<const N: usize>;
+
+impl<const N: usize> Scale<N> {
+    fn one() -> Real {
+        real("scale").between(1e-6, 1e6)
+    }
+
+    fn each() -> Tuple<N, Real> {
+        Tuple::new(
+            if N == 2 { "a scale or scales [u, v]" } else { "a scale or scales [x, y, z]" },
+            Self::one(),
+        )
+    }
 }
 
-/// A factor for each axis.
-pub(in crate::scene) fn scale3() -> Tuple<3, Real> {
-    Tuple::new("a scale or scales [x, y, z]", scale())
+impl<const N: usize> Decode for Scale<N> {
+    type Out = [f64; N];
+
+    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<[f64; N]> {
+        match node.value {
+            Value::Array(_) => Self::each().decode(node, cx),
+            Value::Null | Value::Bool | Value::Number(_) | Value::String(_) | Value::Object(_) => {
+                Self::one().decode(node, cx).map(|s| [s; N])
+            }
+        }
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "anyOf": [Self::one().schema(definitions), Self::each().schema(definitions)] })
+    }
+}
+
+impl<const N: usize> Encode for Scale<N> {
+    fn encode(&self, value: &[f64; N]) -> serde_json::Value {
+        Self::each().encode(value)
+    }
 }
 
 /// A vector that points somewhere; it need not have length 1.
