@@ -8,8 +8,7 @@ use crate::pass2_eye::Footprints;
 use crate::photon_map;
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
-use crate::scene::{Light, LightSampling, Material, Paths, Scene};
-use glam::Vec3;
+use crate::scene::{Environment, Light, LightSampling, Material, Paths, Scene};
 use rayon::prelude::*;
 
 /// What a render will do. A pure function of the scene.
@@ -207,7 +206,7 @@ impl Plan {
         if dark > 0 {
             self.warn("zero_power_light", format!("{dark} of {} lights give no light", scene.lights.len()));
         }
-        if lit == 0 && scene.environment == Vec3::ZERO {
+        if lit == 0 && scene.environment.is_black() {
             self.decide("direct light", false, "nothing", "no light gives light");
             self.warn("no_light", "no light gives light: the picture is black");
             return;
@@ -226,10 +225,21 @@ impl Plan {
             )
         };
         self.decide("direct light", true, choice, reason);
-        if scene.environment != Vec3::ZERO {
-            self.decide("environment", true, "one ray by the cosine", "the environment gives light");
-        } else {
-            self.decide("environment", false, "no rays", "the environment is black");
+        match &scene.environment {
+            environment if environment.is_black() => {
+                self.decide("environment", false, "no rays", "the environment is black");
+            }
+            Environment::Constant(_) => {
+                self.decide(
+                    "environment",
+                    true,
+                    "one ray by the cosine",
+                    "it gives the same light from everywhere",
+                );
+            }
+            Environment::Image(_) => {
+                self.decide("environment", true, "one ray by its brightness", "the environment is a picture");
+            }
         }
     }
 

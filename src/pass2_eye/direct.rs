@@ -3,8 +3,8 @@
 use crate::geometry::{Ray, SurfacePoint, offset_origin};
 use crate::optics::transmittance;
 use crate::sampling::{SamplePoint, cosine_hemisphere};
-use crate::scene::{Light, Scene, SpotLight};
-use glam::Vec3;
+use crate::scene::{Environment, Light, Scene, SpotLight};
+use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
 mod area;
@@ -59,14 +59,8 @@ pub(super) fn direct_light(
         };
         sum += visible(scene, receiver, incident, shadow_rays);
     }
-    if scene.environment != Vec3::ZERO {
-        let direction = cosine_hemisphere(receiver.normal, sample.get_2d(4));
-        // The density cosθ/π cancels the cosine.
-        let irradiance = scene.environment * PI;
-        let incident = Incident { direction, distance: f32::INFINITY, irradiance };
-        sum += visible(scene, receiver, Some(incident), shadow_rays);
-    }
-    sum
+    let incident = from_environment(receiver, &scene.environment, sample.get_2d(4));
+    sum + visible(scene, receiver, incident, shadow_rays)
 }
 
 /// The irradiance if nothing is in the way. S surfaces are in the way too: what comes through them is the
@@ -104,6 +98,19 @@ fn from_spot(receiver: &Receiver<'_>, spot: &SpotLight) -> Option<Incident> {
     let mut incident = from_point(receiver, spot.position, Vec3::ONE)?;
     incident.irradiance *= spot.intensity_along(-incident.direction);
     Some(incident)
+}
+
+/// By the cosine where the light is the same from everywhere, else by how bright it is.
+fn from_environment(receiver: &Receiver<'_>, environment: &Environment, u: Vec2) -> Option<Incident> {
+    let (direction, irradiance) = match environment {
+        // The density cosθ/π cancels the cosine.
+        Environment::Constant(radiance) => (cosine_hemisphere(receiver.normal, u), *radiance * PI),
+        Environment::Image(_) => {
+            let from = environment.sample(u)?;
+            (from.direction, from.radiance * (receiver.normal.dot(from.direction).max(0.0) / from.pdf))
+        }
+    };
+    Some(Incident { direction, distance: f32::INFINITY, irradiance })
 }
 
 fn from_afar(receiver: &Receiver<'_>, direction: Vec3, irradiance: Vec3) -> Option<Incident> {

@@ -145,7 +145,9 @@ impl<'a> EyeWalk<'a> {
         self.counts.eye_rays += 1;
         let Some(hit) = scene.geometry.closest_hit(&branch.ray) else {
             let throughput = branch.throughput * optics::transmittance(branch.absorption, f32::INFINITY);
-            sums.halves[self.half].classes.add(PathClass::Emitted, throughput * scene.environment);
+            sums.halves[self.half]
+                .classes
+                .add(PathClass::Emitted, throughput * scene.environment.radiance(branch.ray.direction));
             return;
         };
         let material = scene.material_of(hit.object);

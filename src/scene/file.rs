@@ -66,8 +66,8 @@ record! {
         objects: Option<Vec<Option<ObjectFile>>> = part(required(slots(object::<ObjectFile>()))),
         /// All lights but the environment.
         lights: Option<Vec<Option<LightFile>>> = part(or(slots(object::<LightFile>()), Vec::new())),
-        /// What surrounds the scene.
-        environment: Option<Option<EnvironmentFile>> = part(optional(object::<EnvironmentFile>())),
+        /// The light from infinitely far away, where no object is in its way; none if left out.
+        environment: Option<Option<EnvironmentFile>> = part(optional(Surroundings)),
         /// What is asked of the renderer.
         render: Option<RenderFile> = part(or(object::<RenderFile>(), RenderFile::default())),
     }
@@ -234,10 +234,32 @@ record! {
     }
 }
 
+/// What surrounds the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum EnvironmentFile {
+    /// The same from everywhere.
+    Constant(ConstantEnvironmentFile),
+    /// A picture.
+    Image(ImageEnvironmentFile),
+}
+
 record! {
-    /// What surrounds the scene.
-    EnvironmentFile {
-        /// Radiance, the same from everywhere.
+    /// A picture of all directions: rows are latitudes, +y above; the middle column lies at -z, and to the right of it
+    /// is +x.
+    ImageEnvironmentFile {
+        /// A Radiance (.hdr) or OpenEXR (.exr) file whose values are radiance in W·sr⁻¹·m⁻².
+        image: String = required(name()),
+        /// Factor on the picture's radiance.
+        scale: f64 = or(real("factor on the radiance").between(0.0, MAX_LENGTH), 1.0),
+        /// By how much the picture is turned about the y axis, anticlockwise seen from above.
+        rotate: f64 = or(real("angle in degrees").between(-3600.0, 3600.0).unit("°"), 0.0),
+    }
+}
+
+record! {
+    /// The same light from everywhere.
+    ConstantEnvironmentFile {
+        /// Radiance.
         radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
     }
 }
@@ -322,7 +344,6 @@ impl Decode for Albedo {
     type Out = AlbedoFile;
 
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<AlbedoFile> {
-        let has = |members: &[Member<'_>], name| members.iter().any(|member| member.key == name);
         match &node.value {
             Value::Object(members) if has(members, "image") => {
                 object::<ImageTextureFile>().decode(node, cx).map(AlbedoFile::Image)
@@ -342,5 +363,29 @@ impl Decode for Albedo {
         let color = color("albedo").fraction().schema(definitions);
         let checker = object::<PatternFile>().schema(definitions);
         json!({ "anyOf": [color, checker, object::<ImageTextureFile>().schema(definitions)] })
+    }
+}
+
+fn has(members: &[Member<'_>], name: &str) -> bool {
+    members.iter().any(|member| member.key == name)
+}
+
+struct Surroundings;
+
+impl Decode for Surroundings {
+    type Out = EnvironmentFile;
+
+    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<EnvironmentFile> {
+        match &node.value {
+            Value::Object(members) if has(members, "image") => {
+                object::<ImageEnvironmentFile>().decode(node, cx).map(EnvironmentFile::Image)
+            }
+            _ => object::<ConstantEnvironmentFile>().decode(node, cx).map(EnvironmentFile::Constant),
+        }
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        let constant = object::<ConstantEnvironmentFile>().schema(definitions);
+        json!({ "anyOf": [constant, object::<ImageEnvironmentFile>().schema(definitions)] })
     }
 }

@@ -6,6 +6,7 @@
 pub mod assets;
 mod camera;
 mod compile;
+mod environment;
 mod file;
 mod issue;
 mod json;
@@ -20,6 +21,7 @@ mod texture;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, MemoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection};
+pub use environment::{Environment, EnvironmentImage, EnvironmentSample};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
 pub use material::{Conductor, Material};
@@ -28,7 +30,7 @@ pub use texture::{Texture, TextureImage};
 
 use crate::geometry::{Geometry, Structure};
 use crate::radius::RadiusRule;
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 
 macro_rules! typed_id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -76,8 +78,8 @@ pub struct Scene {
     pub geometry: Geometry,
     /// All lights but the environment.
     pub lights: Vec<Light>,
-    /// Radiance of the constant environment, W·sr⁻¹·m⁻².
-    pub environment: Vec3,
+    /// What surrounds it all.
+    pub environment: Environment,
     /// Bytes of the pictures that textures and environment are made of.
     pub image_bytes: u64,
     /// What the file asks of the renderer.

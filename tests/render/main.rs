@@ -6,6 +6,7 @@ mod camera;
 mod caustics;
 mod determinism;
 mod direct_light;
+mod environment;
 mod geometry;
 mod geometry_shapes;
 mod geometry_structures;

@@ -3,6 +3,7 @@
 
 mod camera;
 mod emission;
+mod environment;
 mod light;
 mod material;
 mod mesh;
@@ -57,6 +58,7 @@ fn note_parse_error(error: ParseError, issues: &mut Issues) {
 fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> Option<Scene> {
     let mut compiler = Compiler {
         issues,
+        assets,
         meshes: MeshLoader::new(assets),
         textures: TextureLoader::new(assets),
         originals: Originals::new(file.objects.as_deref().unwrap_or_default()),
@@ -72,9 +74,11 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
     compiler.objects(file.objects.as_deref().unwrap_or_default());
     compiler.lights(file.lights.as_deref().unwrap_or_default());
     let render = file.render.as_ref().and_then(|render| compiler.render(render));
+    let environment = compiler.environment(file.environment.as_ref().and_then(Option::as_ref));
     if compiler.issues.count() > 0 {
         return None;
     }
+    let environment = environment?;
     Some(Scene {
         name: file.name.clone()?.unwrap_or_default(),
         image,
@@ -83,8 +87,8 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         objects: compiler.objects,
         geometry: compiler.geometry.build_as(render.as_ref()?.structure),
         lights: compiler.lights,
-        environment: file.environment.as_ref()?.as_ref().map_or(Vec3::ZERO, |e| vec3(e.radiance)),
-        image_bytes: compiler.textures.memory_bytes(),
+        image_bytes: compiler.textures.memory_bytes() + environment.memory_bytes(),
+        environment,
         render: render?,
     })
 }
@@ -95,6 +99,7 @@ type Refusal = (IssueCode, String);
 /// The scene while it grows.
 struct Compiler<'f> {
     issues: &'f mut Issues,
+    assets: &'f dyn AssetSource,
     meshes: MeshLoader<'f>,
     textures: TextureLoader<'f>,
     originals: Originals<'f>,
