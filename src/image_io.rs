@@ -1,6 +1,7 @@
 //! Pictures of linear radiance, and the files they are kept in: PNG for people, EXR and npy for programs.
 
 mod exr_file;
+mod hdr_file;
 mod npy;
 mod png_file;
 
@@ -10,6 +11,9 @@ pub use png_file::encode_png;
 
 /// Most pixels across or down that are read.
 const MAX_SIDE: usize = 16_384;
+
+/// Most pixels in all of a picture that is read to be compared.
+const MAX_PIXELS: u64 = 1 << 28;
 
 /// Linear radiance per pixel, top row first.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,9 +71,27 @@ pub enum ImageError {
 pub fn decode(bytes: &[u8], format: ImageFormat) -> Result<LinearImage, ImageError> {
     match format {
         ImageFormat::Png => png_file::decode(bytes),
-        ImageFormat::Exr => exr_file::decode(bytes),
+        ImageFormat::Exr => exr_file::decode(bytes, MAX_PIXELS),
         ImageFormat::Npy => npy::decode_image(bytes),
     }
+}
+
+/// Reads a picture of linear radiance of at most `most_pixels` pixels: OpenEXR or Radiance, told apart by their first
+/// bytes. The size is checked before memory is taken for it.
+///
+/// # Errors
+/// If the bytes are neither, or a value is not finite.
+pub fn decode_hdr(bytes: &[u8], most_pixels: u64) -> Result<LinearImage, ImageError> {
+    let image = if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        exr_file::decode(bytes, most_pixels)?
+    } else if bytes.starts_with(b"#?") {
+        hdr_file::decode(bytes, most_pixels)?
+    } else {
+        let reason = "it begins like neither a Radiance nor an OpenEXR file".to_owned();
+        return Err(ImageError::Malformed { format: "HDR", reason });
+    };
+    image.check()?;
+    Ok(image)
 }
 
 impl ImageFormat {
@@ -104,11 +126,14 @@ impl LinearImage {
 }
 
 /// Checks the size that a file claims, before memory is taken for it.
-fn check_size(width: usize, height: usize) -> Result<(u32, u32), ImageError> {
+fn check_size(width: usize, height: usize, most_pixels: u64) -> Result<(u32, u32), ImageError> {
     let side = |n: usize| u32::try_from(n).ok().filter(|_| (1..=MAX_SIDE).contains(&n));
-    side(width)
-        .zip(side(height))
-        .ok_or_else(|| ImageError::Size(format!("{width} × {height}; 1 to {MAX_SIDE} pixels each are read")))
+    side(width).zip(side(height)).filter(|(w, h)| u64::from(*w) * u64::from(*h) <= most_pixels).ok_or_else(
+        || {
+            let limits = format!("1 to {MAX_SIDE} pixels each, and {most_pixels} in all, are read");
+            ImageError::Size(format!("{width} × {height}; {limits}"))
+        },
+    )
 }
 
 #[cfg(test)]

@@ -8,8 +8,7 @@ use crate::pass2_eye::Footprints;
 use crate::photon_map;
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
-use crate::scene::{Light, LightSampling, Material, Paths, Scene, Warning};
-use glam::Vec3;
+use crate::scene::{Environment, Light, LightSampling, Material, Paths, Scene, Warning};
 use rayon::prelude::*;
 
 /// What a render will do. A pure function of the scene.
@@ -75,7 +74,7 @@ impl Plan {
             photons: Vec::new(),
             radius: scene.render.radius,
             eye_media: Media::around(scene, scene.camera.eye),
-            lights_can_be_met: scene.environment != Vec3::ZERO
+            lights_can_be_met: !scene.environment.is_black()
                 || scene.lights.iter().any(|l| l.surface_radiance().is_some()),
             moves: scene.geometry.moves(),
             decisions: Vec::new(),
@@ -208,7 +207,7 @@ impl Plan {
         if dark > 0 {
             self.warn("zero_power_light", format!("{dark} of {} lights give no light", scene.lights.len()));
         }
-        if lit == 0 && scene.environment == Vec3::ZERO {
+        if lit == 0 && scene.environment.is_black() {
             self.decide("direct light", false, "nothing", "no light gives light");
             self.warn("no_light", "no light gives light: the picture is black");
             return;
@@ -227,10 +226,21 @@ impl Plan {
             )
         };
         self.decide("direct light", true, choice, reason);
-        if scene.environment != Vec3::ZERO {
-            self.decide("environment", true, "one ray by the cosine", "the environment gives light");
-        } else {
-            self.decide("environment", false, "no rays", "the environment is black");
+        match &scene.environment {
+            environment if environment.is_black() => {
+                self.decide("environment", false, "no rays", "the environment is black");
+            }
+            Environment::Constant(_) => {
+                self.decide(
+                    "environment",
+                    true,
+                    "one ray by the cosine",
+                    "it gives the same light from everywhere",
+                );
+            }
+            Environment::Image(_) => {
+                self.decide("environment", true, "one ray by its brightness", "the environment is a picture");
+            }
         }
     }
 
@@ -299,7 +309,7 @@ impl Plan {
         let passing =
             if self.photons.is_empty() { 2 * film } else { (2 * film).max(pixels * SMOOTHING_BYTES) };
         let footprints = if self.photons.is_empty() { 0 } else { pixels * Footprints::BYTES_PER_PIXEL };
-        scene.geometry.memory_bytes() + film + footprints + passing + photons * per_photon
+        scene.geometry.memory_bytes() + scene.image_bytes + film + footprints + passing + photons * per_photon
     }
 }
 

@@ -3,6 +3,10 @@
 //! Both passes draw from Owen-scrambled Sobol sequences (Joe and Kuo 2008; scrambling by hash, Burley 2020
 //! with the hash of Vegdahl 2021). Beyond [`SOBOL_DIMENSIONS`] dimensions a hash takes over.
 
+mod density;
+
+pub use density::Density2d;
+
 /// Number of dimensions that are low-discrepancy; later ones are independent random numbers.
 pub const SOBOL_DIMENSIONS: u32 = 19;
 

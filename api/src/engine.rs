@@ -67,6 +67,12 @@ impl LoadedScene {
     }
 }
 
+/// The JSON Schema of scenes.
+#[must_use]
+pub fn scene_schema() -> Value {
+    nephroid::scene::schema()
+}
+
 /// The files that come with the samples.
 struct SampleAssets;
 

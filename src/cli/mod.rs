@@ -6,6 +6,7 @@ mod files;
 mod plan;
 mod progress;
 mod render;
+mod schema;
 
 use clap::{Parser, Subcommand};
 use nephroid::scene::SceneErrors;
@@ -29,6 +30,8 @@ enum Command {
     Check(check::CheckArguments),
     /// Measure how one picture differs from another.
     Compare(compare::CompareArguments),
+    /// Print the JSON Schema of scene files.
+    Schema(schema::SchemaArguments),
 }
 
 /// Runs what was typed.
@@ -38,6 +41,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Schema(arguments) => schema::run(&arguments),
     }
 }
 

@@ -55,11 +55,11 @@ impl Sphere {
     }
 }
 
-/// Longitude and latitude, each 0..1.
+/// Once around, to the right seen from outside, and from bottom to top, each 0..1; the middle faces +z.
 fn sphere_uv(normal: Vec3) -> Vec2 {
     use std::f32::consts::{PI, TAU};
-    let longitude = libm::atan2f(normal.z, normal.x) / TAU + 0.5;
-    Vec2::new(longitude, libm::acosf(normal.y.clamp(-1.0, 1.0)) / PI)
+    let longitude = libm::atan2f(normal.x, normal.z) / TAU + 0.5;
+    Vec2::new(longitude, 1.0 - libm::acosf(normal.y.clamp(-1.0, 1.0)) / PI)
 }
 
 /// Both distances at which a line meets a sphere, near one first; `None` if it misses.

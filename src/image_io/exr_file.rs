@@ -34,12 +34,15 @@ pub fn encode_exr(image: &LinearImage) -> Result<Vec<u8>, ImageError> {
     Ok(bytes.into_inner())
 }
 
-pub(super) fn decode(bytes: &[u8]) -> Result<LinearImage, ImageError> {
+/// Reads an OpenEXR file of at most `most_pixels` pixels.
+pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<LinearImage, ImageError> {
     let malformed =
         |error: exr::error::Error| ImageError::Malformed { format: "EXR", reason: error.to_string() };
     let meta = MetaData::read_from_buffered(bytes, false).map_err(malformed)?;
-    let size = meta.headers.first().map_or(Vec2(0, 0), |header| header.layer_size);
-    let (width, height) = check_size(size.width(), size.height())?;
+    // Of several layers the first that has the channels is read, whichever that is.
+    for header in &meta.headers {
+        check_size(header.layer_size.width(), header.layer_size.height(), most_pixels)?;
+    }
     let image = read()
         .no_deep_data()
         .largest_resolution_level()
@@ -60,9 +63,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<LinearImage, ImageError> {
         .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(malformed)?;
-    let (_, pixels) = image.layer_data.channel_data.pixels;
-    if pixels.len() as u64 != u64::from(width) * u64::from(height) {
-        return Err(ImageError::Size("the first layer has no RGB channels".to_owned()));
-    }
+    let (width, pixels) = image.layer_data.channel_data.pixels;
+    let (width, height) = check_size(width, pixels.len() / width.max(1), most_pixels)?;
     Ok(LinearImage { width, height, pixels })
 }

@@ -1,6 +1,6 @@
 //! Pictures and masks as numpy arrays (format versions 1 to 3), little-endian, in C order.
 
-use super::{ImageError, LinearImage, check_size};
+use super::{ImageError, LinearImage, MAX_PIXELS, check_size};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 
@@ -41,7 +41,7 @@ pub(super) fn decode_image(bytes: &[u8]) -> Result<LinearImage, ImageError> {
     let &[height, width, 3] = array.shape.as_slice() else {
         return Err(malformed(format!("expected height × width × 3, found {:?}", array.shape)));
     };
-    let (width, height) = check_size(width, height)?;
+    let (width, height) = check_size(width, height, MAX_PIXELS)?;
     let floats: Vec<f32> = match array.descr.as_str() {
         "<f4" => array.elements()?.iter().map(|x| f32::from_le_bytes(*x)).collect(),
         "<f8" => array.elements()?.iter().map(|x| f64::from_le_bytes(*x) as f32).collect(),
@@ -59,7 +59,7 @@ pub fn decode_mask(bytes: &[u8]) -> Result<Mask, ImageError> {
     let &[height, width] = array.shape.as_slice() else {
         return Err(malformed(format!("expected height × width, found {:?}", array.shape)));
     };
-    let (width, height) = check_size(width, height)?;
+    let (width, height) = check_size(width, height, MAX_PIXELS)?;
     match array.descr.as_str() {
         "|b1" | "|u1" | "<u1" | "<b1" => {
             let values = array.elements::<1>()?.iter().map(|[x]| *x != 0).collect();

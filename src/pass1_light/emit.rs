@@ -3,7 +3,7 @@
 use super::window::{Region, Source, Window};
 use crate::geometry::{Ray, offset_origin};
 use crate::sampling::{SamplePoint, concentric_disc, cone_direction, cosine_hemisphere, uniform_sphere};
-use crate::scene::{DiskLight, Light, LightPoint, QuadLight, Scene, SphereLight, SpotLight};
+use crate::scene::{DiskLight, Environment, Light, LightPoint, QuadLight, Scene, SphereLight, SpotLight};
 use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
 
@@ -15,10 +15,10 @@ pub struct Emission<'a> {
     retreat: f32,
 }
 
-/// A light, or the environment's radiance.
+/// What the photons come from.
 enum Sampler<'a> {
     Light(&'a Light),
-    Environment(Vec3),
+    Environment(&'a Environment),
 }
 
 /// A photon that sets out.
@@ -45,7 +45,7 @@ impl<'a> Emission<'a> {
     pub fn new(scene: &'a Scene, window: &'a Window) -> Self {
         let source = match window.source {
             Source::Light(id) => Sampler::Light(&scene.lights[id.index()]),
-            Source::Environment => Sampler::Environment(scene.environment),
+            Source::Environment => Sampler::Environment(&scene.environment),
         };
         let bounds = scene.geometry.bounds();
         Self { window, source, retreat: 2.5 * bounds.radius() }
@@ -65,8 +65,8 @@ impl<'a> Emission<'a> {
             None => (sample.get_2d(0), 1.0),
         };
         let mut photon = match &self.source {
-            Sampler::Environment(radiance) => {
-                self.emit_from_environment(*radiance, through, sample.get_2d(2))
+            Sampler::Environment(environment) => {
+                self.emit_from_environment(environment, through, sample.get_2d(2))
             }
             Sampler::Light(Light::Directional { direction, irradiance }) => {
                 self.emit_from_afar(*direction, *irradiance, through)
@@ -179,14 +179,20 @@ impl<'a> Emission<'a> {
     }
 
     /// From all around toward a sphere that holds the caster.
-    fn emit_from_environment(&self, radiance: Vec3, through: Vec2, u: Vec2) -> Option<EmittedPhoton> {
+    fn emit_from_environment(
+        &self,
+        environment: &Environment,
+        through: Vec2,
+        u: Vec2,
+    ) -> Option<EmittedPhoton> {
         let Region::Disc { center, radius } = self.window.region else { return None };
-        let direction = uniform_sphere(u);
+        let from = environment.sample(u)?;
+        let direction = -from.direction;
         let (x, y) = direction.any_orthonormal_pair();
         let disc = concentric_disc(through) * radius;
         let target = center + x * disc.x + y * disc.y;
         let ray = Ray::new(target - direction * self.retreat, direction);
-        Some(EmittedPhoton { ray, power: radiance * (4.0 * PI * PI * radius * radius) })
+        Some(EmittedPhoton { ray, power: from.radiance * (PI * radius * radius / from.pdf) })
     }
 }
 

@@ -4,6 +4,7 @@
 //! square of that, which is the density with the least variance. Cells that deliver nothing keep a small share,
 //! so that nothing is ruled out and the estimate stays unbiased.
 
+use crate::sampling::Density2d;
 use glam::Vec2;
 
 /// Cells across and down a window.
@@ -18,11 +19,10 @@ const LEAST_DELIVERING: u64 = 1000;
 /// A table that promises to save less than this factor of photons is not worth its look-ups.
 const LEAST_GAIN: f32 = 1.3;
 
-/// A piecewise constant density over the unit square, as cumulative sums by row and within rows.
+/// A density over a window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Guide {
-    rows: Vec<f32>,
-    columns: Vec<f32>,
+    density: Density2d,
     /// Gain in photons that the pilot promises.
     gain: f32,
 }
@@ -59,7 +59,7 @@ impl Lesson {
             return None;
         }
         let density: Vec<f32> = score.iter().map(|s| (1.0 - FLOOR) * s * cells / sum + FLOOR).collect();
-        Some(Guide::new(&density, gain))
+        Some(Guide { density: Density2d::new(CELLS, &density)?, gain })
     }
 
     /// Mean over the cell and its neighbours: what lies between the pilot's few photons is not lost.
@@ -73,30 +73,11 @@ impl Lesson {
 }
 
 impl Guide {
-    fn new(density: &[f32], gain: f32) -> Self {
-        let mut rows = vec![0.0; CELLS + 1];
-        let mut columns = vec![0.0; CELLS * (CELLS + 1)];
-        for y in 0..CELLS {
-            let line = &mut columns[y * (CELLS + 1)..][..=CELLS];
-            for x in 0..CELLS {
-                line[x + 1] = line[x] + density[y * CELLS + x];
-            }
-            rows[y + 1] = rows[y] + line[CELLS];
-            let total = line[CELLS];
-            line.iter_mut().for_each(|sum| *sum /= total);
-        }
-        let total = rows[CELLS];
-        rows.iter_mut().for_each(|sum| *sum /= total);
-        Self { rows, columns, gain }
-    }
-
     /// The point of the density that a uniform point of the unit square maps to, and the density there.
     #[inline]
     #[must_use]
     pub fn warp(&self, u: Vec2) -> (Vec2, f32) {
-        let (row, y, rows_density) = invert(&self.rows, u.y);
-        let (_, x, columns_density) = invert(&self.columns[row * (CELLS + 1)..][..=CELLS], u.x);
-        (Vec2::new(x, y), rows_density * columns_density)
+        self.density.warp(u)
     }
 
     /// Gain in photons that the pilot promises.
@@ -104,16 +85,6 @@ impl Guide {
     pub fn gain(&self) -> f32 {
         self.gain
     }
-}
-
-/// Inverts a cumulative sum: the cell, the place, and the density there.
-#[inline]
-fn invert(sums: &[f32], u: f32) -> (usize, f32, f32) {
-    let cell = (sums.partition_point(|&s| s <= u)).clamp(1, CELLS) - 1;
-    let width = sums[cell + 1] - sums[cell];
-    let within = ((u - sums[cell]) / width).clamp(0.0, 1.0);
-    let place = ((cell as f32 + within) / CELLS as f32).min(1.0 - f32::EPSILON);
-    (cell, place, width * CELLS as f32)
 }
 
 #[cfg(test)]

@@ -76,7 +76,7 @@ pub fn windows(scene: &Scene) -> Vec<Window> {
         .filter(|id| !scene.lights[id.index()].is_dark())
         .map(Source::Light)
         .collect();
-    if scene.environment != Vec3::ZERO {
+    if !scene.environment.is_black() {
         sources.push(Source::Environment);
     }
     let hulls: Vec<Vec<HullPoint>> = casters.iter().map(|&o| scene.geometry.hull(o)).collect();

@@ -5,8 +5,8 @@ use crate::bsdf::Bsdf;
 use crate::geometry::{Ray, SurfacePoint, offset_origin};
 use crate::optics::transmittance;
 use crate::sampling::{SamplePoint, cosine_hemisphere};
-use crate::scene::{Light, Scene, SpotLight};
-use glam::Vec3;
+use crate::scene::{Environment, Light, Scene, SpotLight};
+use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
 mod area;
@@ -111,18 +111,8 @@ pub(super) fn direct_light(receiver: &Receiver<'_>, sample: SamplePoint, shadow_
         };
         sum += receiver.visible(incident, shadow_rays);
     }
-    // What shines from all around is left to scattered rays where highlights are sharp.
-    if scene.environment != Vec3::ZERO && receiver.bsdf.albedo().is_some() {
-        let direction = cosine_hemisphere(receiver.bsdf.shading, sample.get_2d(4));
-        // The density cosθ/π cancels the cosine of the BSDF.
-        let cosine = direction.dot(receiver.bsdf.shading).max(f32::MIN_POSITIVE);
-        let irradiance = scene.environment * (PI / cosine);
-        sum += receiver.visible(
-            Some(Incident { direction, distance: f32::INFINITY, irradiance, pdf: None }),
-            shadow_rays,
-        );
-    }
-    sum
+    let incident = from_environment(receiver, &scene.environment, sample.get_2d(4));
+    sum + receiver.visible(incident, shadow_rays)
 }
 
 fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Option<Incident> {
@@ -143,6 +133,34 @@ fn from_spot(receiver: &Receiver<'_>, spot: &SpotLight) -> Option<Incident> {
     let mut incident = from_point(receiver, spot.position, Vec3::ONE)?;
     incident.irradiance *= spot.intensity_along(-incident.direction);
     Some(incident)
+}
+
+/// By the cosine where the light is the same from everywhere, else by how bright it is. Where highlights are sharp,
+/// what is the same from everywhere is left to scattered rays.
+fn from_environment(receiver: &Receiver<'_>, environment: &Environment, u: Vec2) -> Option<Incident> {
+    let shading = receiver.bsdf.shading;
+    let (direction, irradiance, pdf) = match environment {
+        Environment::Constant(_) if receiver.bsdf.albedo().is_none() => return None,
+        Environment::Constant(radiance) => {
+            let direction = cosine_hemisphere(shading, u);
+            // The density cosθ/π cancels the cosine of the BSDF.
+            (direction, *radiance * (PI / direction.dot(shading).max(f32::MIN_POSITIVE)), None)
+        }
+        Environment::Image(_) => {
+            let from = environment.sample(u)?;
+            (from.direction, from.radiance / from.pdf, Some(from.pdf))
+        }
+    };
+    let incident = Incident { direction, distance: f32::INFINITY, irradiance, pdf };
+    receiver.faces(direction).then_some(incident)
+}
+
+/// Density per solid angle with which the environment is sampled at a surface with highlights.
+pub(super) fn environment_density(environment: &Environment, direction: Vec3) -> f32 {
+    match environment {
+        Environment::Constant(_) => 0.0,
+        Environment::Image(_) => environment.pdf(direction),
+    }
 }
 
 fn from_afar(receiver: &Receiver<'_>, direction: Vec3, irradiance: Vec3) -> Option<Incident> {

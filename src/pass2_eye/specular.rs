@@ -6,6 +6,7 @@
 //! still add.
 
 use super::EyeContext;
+use super::direct::{environment_density, power_heuristic};
 use crate::film::PixelSums;
 use crate::geometry::{Hit, Ray, offset_origin};
 use crate::light_path::PathClass;
@@ -259,12 +260,16 @@ impl<'a> EyeWalk<'a> {
     /// A ray that meets nothing sees the environment. After a D and an S that is the photons' part; after a D alone
     /// it is the scattered rays' only where highlights are sharp.
     fn escape(&mut self, branch: &Branch, sums: &mut PixelSums) {
-        let radiance = branch.throughput * self.context.scene.environment;
-        let class = match branch.scattered {
-            None => PathClass::Emitted,
-            Some(Scattered { straight: true, pdf: Some(_), count, .. }) => PathClass::with_light_after(count),
-            Some(_) => return,
-        };
-        sums.halves[self.half].classes.add(class, radiance);
+        let (environment, direction) = (&self.context.scene.environment, branch.ray.direction);
+        let radiance = branch.throughput * environment.radiance(direction);
+        let classes = &mut sums.halves[self.half].classes;
+        match branch.scattered {
+            None => classes.add(PathClass::Emitted, radiance),
+            Some(Scattered { straight: true, pdf: Some(pdf), count, .. }) => {
+                let weight = power_heuristic(pdf, environment_density(environment, direction));
+                classes.add(PathClass::with_light_after(count), radiance * weight);
+            }
+            Some(_) => {}
+        }
     }
 }

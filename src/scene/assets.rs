@@ -1,6 +1,7 @@
 //! Where the files come from that a scene names.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
@@ -30,7 +31,7 @@ pub enum AssetError {
     #[error("`{0}` is larger than 1 GiB")]
     TooLarge(String),
     /// The source has no assets at all.
-    #[error("no assets can be used here; give the mesh in the scene itself")]
+    #[error("no files can be used here")]
     NoAssets,
     /// The asset is there and cannot be read.
     #[error("`{name}` cannot be read: {reason}")]
@@ -49,6 +50,20 @@ pub struct NoAssets;
 impl AssetSource for NoAssets {
     fn read(&self, _name: &str) -> Result<Cow<'_, [u8]>, AssetError> {
         Err(AssetError::NoAssets)
+    }
+}
+
+/// Files that are held in memory, by name.
+#[derive(Clone, Debug, Default)]
+pub struct MemoryAssets {
+    /// The bytes of each.
+    pub files: BTreeMap<String, Vec<u8>>,
+}
+
+impl AssetSource for MemoryAssets {
+    fn read(&self, name: &str) -> Result<Cow<'_, [u8]>, AssetError> {
+        let file = self.files.get(name).ok_or_else(|| AssetError::NotFound(name.to_owned()))?;
+        Ok(Cow::Borrowed(file))
     }
 }
 

@@ -3,24 +3,25 @@
 //! Each type here is the one declaration of its JSON: field names, types, limits, defaults.
 
 use super::issue::{IssueCode, Issues};
-use super::json::{Node, Value};
+use super::json::{Member, Node, Value};
 use super::light_file::LightFile;
+use super::material_file::MaterialFile;
 use super::read::{
     Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, name, named, note_duplicates,
     object, optional, or, pair, part, point, real, record, reference, required, seed, slots, tagged,
 };
+use super::schema::Definitions;
 use super::shape_file::{MotionFile, ShapeFile};
-use super::{Highlight, LightSampling, Paths, Tone};
+use super::{LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
+use serde_json::json;
 use std::collections::BTreeSet;
 
 /// The version of the format that is read.
 const VERSION: f64 = 1.0;
 /// Most pixels across or down.
 const MAX_IMAGE_SIDE: u32 = 16_384;
-/// Largest index of refraction.
-const MAX_INDEX: f64 = 100.0;
 /// Squares along each side of a light, if not given.
 const LIGHT_GRID: u32 = 4;
 
@@ -46,7 +47,8 @@ fn material_names<'n>(root: &'n Node<'_>) -> BTreeSet<&'n str> {
 }
 
 record! {
-    /// A whole scene. A part that was wrong is `None` (and has been noted), so that the others can be checked.
+    // A part that was wrong is `None` (and has been noted), so that the others can be checked.
+    /// A whole scene.
     SceneFile {
         /// Version of the format.
         nephroid: Option<()> = part(required(Version)),
@@ -62,8 +64,8 @@ record! {
         objects: Option<Vec<Option<ObjectFile>>> = part(required(slots(object::<ObjectFile>()))),
         /// All lights but the environment.
         lights: Option<Vec<Option<LightFile>>> = part(or(slots(object::<LightFile>()), Vec::new())),
-        /// What surrounds the scene.
-        environment: Option<Option<EnvironmentFile>> = part(optional(object::<EnvironmentFile>())),
+        /// The light from infinitely far away, where no object is in its way; none if left out.
+        environment: Option<Option<EnvironmentFile>> = part(optional(Surroundings)),
         /// What is asked of the renderer.
         render: Option<RenderFile> = part(or(object::<RenderFile>(), RenderFile::default())),
     }
@@ -76,9 +78,9 @@ record! {
         width: u32 = or(count("width in pixels", 1, MAX_IMAGE_SIDE), 640),
         /// Pixels down.
         height: u32 = or(count("height in pixels", 1, MAX_IMAGE_SIDE), 480),
-        /// Exposure in stops.
-        exposure: f64 = or(real("exposure in stops").between(-64.0, 64.0), 0.0),
-        /// Curve between linear radiance and the display.
+        /// Exposure: the picture is multiplied by 2 to the power of it.
+        exposure: f64 = or(real("exposure in stops").between(-64.0, 64.0).unit("stops"), 0.0),
+        /// Curve between linear radiance and the display: clipped at 1, or with highlights rolled off.
         tone: Tone = or(choice(vec![("linear", Tone::Linear), ("filmic", Tone::Filmic)]), Tone::Linear),
     }
 }
@@ -103,9 +105,9 @@ record! {
         /// When the shutter opens and closes, in seconds: what moves meanwhile is blurred.
         shutter: [f64; 2] = or(pair(real("time in seconds")), [0.0, 0.0]),
         /// Vertical field of view in degrees.
-        fov: f64 = required(real("vertical field of view in degrees").above(0.0).below(180.0)),
+        fov: f64 = required(real("vertical field of view in degrees").above(0.0).below(180.0).unit("°")),
         /// Diameter of the lens in metres; 0 is a pinhole.
-        aperture: f64 = or(real("diameter of the lens in metres").between(0.0, MAX_LENGTH), 0.0),
+        aperture: f64 = or(real("diameter of the lens in metres").between(0.0, MAX_LENGTH).unit("m"), 0.0),
         /// Distance from the lens, along the view, of the plane that is sharp, in metres; that of the target if
         /// left out.
         focus_distance: Option<f64> = optional(real("distance in metres").positive_length()),
@@ -128,144 +130,6 @@ record! {
     }
 }
 
-tagged! {
-    /// A material.
-    MaterialFile {
-        "diffuse" => Diffuse(DiffuseFile),
-        "mirror" => Mirror(MirrorFile),
-        "metal" => Metal(MetalFile),
-        "glass" => Glass(GlassFile),
-        "phong" => Phong(PhongFile),
-        "mix" => Mix(MixFile),
-    }
-}
-
-record! {
-    /// Lambertian reflection.
-    DiffuseFile {
-        /// Fraction of the light reflected.
-        albedo: AlbedoFile = required(Albedo),
-    }
-}
-
-/// A colour, or a pattern of colours.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum AlbedoFile {
-    /// The same everywhere.
-    Color([f64; 3]),
-    /// `{"checker": {…}}`.
-    Checker(CheckerFile),
-}
-
-record! {
-    /// What stands in an albedo that is an object.
-    PatternFile {
-        /// A checkerboard.
-        checker: CheckerFile = required(object::<CheckerFile>()),
-    }
-}
-
-record! {
-    /// A checkerboard.
-    CheckerFile {
-        /// Colours of the even and the odd squares.
-        colors: [[f64; 3]; 2] = required(pair(color("albedo").fraction())),
-        /// Side of a square, in texture coordinates (metres on a polygon).
-        size: f64 = required(real("side of a square").positive_length()),
-    }
-}
-
-record! {
-    /// A perfect mirror.
-    MirrorFile {
-        /// Fraction of the light reflected.
-        reflectance: [f64; 3] = required(color("reflectance").fraction()),
-    }
-}
-
-record! {
-    /// Metal: either `f0`, or `n` and `k`.
-    MetalFile {
-        /// Fraction of the light reflected at normal incidence; more at an angle by Schlick's approximation.
-        f0: Option<[f64; 3]> = optional(color("reflectance").fraction()),
-        /// Real part of the index of refraction, per channel; at an angle Fresnel's equations hold.
-        n: Option<[f64; 3]> = optional(color("real part of the index of refraction").up_to(MAX_INDEX)),
-        /// Imaginary part of the index of refraction, per channel.
-        k: Option<[f64; 3]> = optional(color("imaginary part of the index of refraction").up_to(MAX_INDEX)),
-        /// Roughness: 0 mirrors, 1 is dull. The width of the microfacets' GGX distribution is its square.
-        roughness: f64 = or(real("roughness").between(0.0, 1.0), 0.0),
-    }
-}
-
-record! {
-    /// Glass, or a liquid.
-    GlassFile {
-        /// Index of refraction; of a glass that disperses light by `abbe`, at the d line (587.6 nm).
-        ior: f64 = required(real("index of refraction").above(0.0).at_most(MAX_INDEX)),
-        /// Absorption coefficient per channel, m⁻¹: inside, light falls to 1/e over its reciprocal.
-        absorption: [f64; 3] = or(color("absorption per metre"), [0.0; 3]),
-        /// Abbe number (n_d - 1) / (n_F - n_C): the smaller, the wider the spectrum. About 64 for crown glass, 36 for
-        /// flint glass, 56 for water.
-        abbe: Option<f64> = optional(real("Abbe number").between(1.0, 1000.0)),
-        /// Terms b and c of Cauchy's equation n = a + b/λ² + c/λ⁴, λ in μm, where a is `ior`; instead of `abbe`.
-        cauchy: Option<[f64; 2]> = optional(pair(real("term of Cauchy's equation").between(0.0, 1.0))),
-        /// Where glass and liquids overlap, the one of the highest priority is what is there; of equal ones the one
-        /// that a ray has entered last. Draw a drink a little into the wall of its glass, and give the glass 1.
-        priority: u32 = or(count("priority", 0, 1000), 0),
-        /// Roughness: 0 is clear, 1 is dull. The width of the microfacets' GGX distribution is its square.
-        roughness: f64 = or(real("roughness").between(0.0, 1.0), 0.0),
-    }
-}
-
-record! {
-    /// The illumination equation of Phong and Whitted, term by term: emission + ambient + for each light
-    /// (k_d cos θ + k_s cosⁿ α) + k_r reflection + k_t transmission.
-    PhongFile {
-        /// Radiance of its own, W·sr⁻¹·m⁻²; seen, but not thrown on others.
-        emission: [f64; 3] = or(color("emission"), [0.0; 3]),
-        /// Ambient light, W·sr⁻¹·m⁻².
-        ambient: [f64; 3] = or(color("ambient light"), [0.0; 3]),
-        /// Share of the ambient light that is seen.
-        k_a: [f64; 3] = or(color("share of the ambient light").fraction(), [0.0; 3]),
-        /// Share scattered evenly: the albedo.
-        k_d: AlbedoFile = or(Albedo, AlbedoFile::Color([0.0; 3])),
-        /// Share of the highlight.
-        k_s: [f64; 3] = or(color("share of the highlight").fraction(), [0.0; 3]),
-        /// Sharpness of the highlight.
-        n: f64 = or(real("exponent").between(0.0, 1e5), 20.0),
-        /// The highlight as in the lecture (`lecture`: not weighted by the cosine of incidence, so that a surface lit at
-        /// a slant can reflect more than it receives), or one that never does (`conserving`).
-        highlight: Highlight = or(choice(Highlight::NAMED.to_vec()), Highlight::Lecture),
-        /// Share mirrored.
-        k_r: [f64; 3] = or(color("share mirrored").fraction(), [0.0; 3]),
-        /// Share let through.
-        k_t: [f64; 3] = or(color("share let through").fraction(), [0.0; 3]),
-        /// Index of refraction for what is let through; 1 lets it go straight.
-        ior: f64 = or(real("index of refraction").above(0.0).at_most(MAX_INDEX), 1.0),
-    }
-}
-
-record! {
-    /// So much of one material, and the rest of another.
-    MixFile {
-        /// Name of the first material.
-        first: String = required(reference()),
-        /// Name of the second material.
-        second: String = required(reference()),
-        /// Share of the second: one number for all, or a pattern whose brightness says it.
-        amount: AmountFile = required(Amount),
-    }
-}
-
-/// A number, or a pattern.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum AmountFile {
-    /// The same everywhere.
-    Number(f64),
-    /// The mean of the pattern's channels.
-    Pattern(AlbedoFile),
-}
-
 record! {
     /// An object: a shape made of a material.
     ObjectFile {
@@ -273,10 +137,10 @@ record! {
         name: Option<String> = optional(name()),
         /// Name of its material.
         material: String = required(reference()),
-        /// Radiance of its front, W·sr⁻¹·m⁻²: the outside of a sphere, the side of a polygon or mesh from which
+        /// Radiance of its front: the outside of a sphere, the side of a polygon or mesh from which
         /// its vertices run anticlockwise. Makes the object a light; it still reflects by its material.
-        emission: Option<[f64; 3]> = optional(color("emission")),
-        /// Its velocity, m/s: it moves on a straight line while the camera's `shutter` is open.
+        emission: Option<[f64; 3]> = optional(color("emission").unit("W·sr⁻¹·m⁻²")),
+        /// Its velocity in m/s: it moves on a straight line while the camera's `shutter` is open.
         velocity: [f64; 3] = or(point(), [0.0; 3]),
         /// How it moves while the camera's `shutter` is open, besides by its `velocity`.
         motion: Option<MotionFile> = optional(object::<MotionFile>()),
@@ -286,26 +150,50 @@ record! {
     }
 }
 
+/// What surrounds the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum EnvironmentFile {
+    /// The same from everywhere.
+    Constant(ConstantEnvironmentFile),
+    /// A picture.
+    Image(ImageEnvironmentFile),
+}
+
 record! {
-    /// What surrounds the scene.
-    EnvironmentFile {
-        /// Radiance, the same from everywhere, W·sr⁻¹·m⁻².
-        radiance: [f64; 3] = required(color("radiance")),
+    /// A picture of all directions: rows are latitudes, +y above; the middle column lies at -z, and to the right of it
+    /// is +x.
+    ImageEnvironmentFile {
+        /// A Radiance (.hdr) or OpenEXR (.exr) file whose values are radiance in W·sr⁻¹·m⁻².
+        image: String = required(name()),
+        /// Factor on the picture's radiance.
+        scale: f64 = or(real("factor on the radiance").between(0.0, MAX_LENGTH), 1.0),
+        /// By how much the picture is turned about the y axis, anticlockwise seen from above.
+        rotate: f64 = or(real("angle in degrees").between(-3600.0, 3600.0).unit("°"), 0.0),
+    }
+}
+
+record! {
+    /// The same light from everywhere.
+    ConstantEnvironmentFile {
+        /// Radiance.
+        radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
     }
 }
 
 record! {
     /// What is asked of the renderer.
     RenderFile {
-        /// Which light paths are computed.
+        /// Which light paths are computed: `whitted` is LS*E and LDS*E, `caustics` also LS+DS*E.
         paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
-        /// When the render ends.
+        /// When the render ends; at an error of 0.02 or after 60 seconds if left out.
         stop: Option<StopFile> = optional(object::<StopFile>()),
         /// Radius of the caustics' density estimate: a pixel, or shrinking from round to round.
         radius: RadiusRule = or(choice(RadiusRule::NAMED.to_vec()), RadiusRule::Pixel),
         /// The structure that finds what a ray meets; all find the same.
         structure: Structure = or(choice(Structure::NAMED.to_vec()), Structure::Auto),
-        /// How quad and disk lights are sampled.
+        /// How quad and disk lights are sampled: by one point per eye sample (`sobol`), or by the squares of a grid,
+        /// at their centres (`grid`), at a random point of each (`jittered`), or at their corners, divided where those
+        /// disagree (`adaptive`).
         light_sampling: LightSampling = or(choice(LightSampling::NAMED.to_vec()), LightSampling::Sobol),
         /// Squares along each side of such a light, unless it is sampled by `sobol`.
         light_grid: u32 = or(count("squares along each side of a light", 1, 64), LIGHT_GRID),
@@ -331,10 +219,10 @@ impl Default for RenderFile {
 record! {
     /// When a render ends: the first limit that is reached.
     StopFile {
-        /// Estimated relative error.
+        /// Estimated relative error: 0.02 is 2 %.
         error: Option<f64> = optional(real("relative error (0.02 is 2 %)").above(0.0).at_most(1.0)),
         /// Seconds of rendering.
-        seconds: Option<f64> = optional(real("seconds").above(0.0).at_most(1e9)),
+        seconds: Option<f64> = optional(real("seconds").above(0.0).at_most(1e9).unit("s")),
         /// Number of rounds.
         rounds: Option<u32> = optional(count("number of rounds", 1, u32::MAX)),
     }
@@ -360,32 +248,32 @@ impl Decode for Version {
             }
         }
     }
-}
 
-struct Albedo;
-
-impl Decode for Albedo {
-    type Out = AlbedoFile;
-
-    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<AlbedoFile> {
-        match node.value {
-            Value::Object(_) => {
-                object::<PatternFile>().decode(node, cx).map(|p| AlbedoFile::Checker(p.checker))
-            }
-            _ => color("albedo").fraction().decode(node, cx).map(AlbedoFile::Color),
-        }
+    fn schema(&self, _definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "const": VERSION as u32 })
     }
 }
 
-struct Amount;
+pub(super) fn has(members: &[Member<'_>], name: &str) -> bool {
+    members.iter().any(|member| member.key == name)
+}
 
-impl Decode for Amount {
-    type Out = AmountFile;
+struct Surroundings;
 
-    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<AmountFile> {
-        match node.value {
-            Value::Object(_) => Albedo.decode(node, cx).map(AmountFile::Pattern),
-            _ => real("share of the second").between(0.0, 1.0).decode(node, cx).map(AmountFile::Number),
+impl Decode for Surroundings {
+    type Out = EnvironmentFile;
+
+    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<EnvironmentFile> {
+        match &node.value {
+            Value::Object(members) if has(members, "image") => {
+                object::<ImageEnvironmentFile>().decode(node, cx).map(EnvironmentFile::Image)
+            }
+            _ => object::<ConstantEnvironmentFile>().decode(node, cx).map(EnvironmentFile::Constant),
         }
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        let constant = object::<ConstantEnvironmentFile>().schema(definitions);
+        json!({ "anyOf": [constant, object::<ImageEnvironmentFile>().schema(definitions)] })
     }
 }

@@ -89,7 +89,7 @@ issue_codes! {
     IndexOutOfRange = "index_out_of_range",
     /// An asset that cannot be read.
     AssetUnavailable = "asset_unavailable",
-    /// An asset whose content is not a mesh this program reads.
+    /// An asset whose content is not what it is used as, or damaged.
     AssetInvalid = "asset_invalid",
     /// There are more errors than are listed.
     TooManyIssues = "too_many_issues",

@@ -19,8 +19,8 @@ record! {
     PointLightFile {
         /// Where it is.
         position: [f64; 3] = required(point()),
-        /// Radiant intensity, W·sr⁻¹.
-        intensity: [f64; 3] = required(color("intensity")),
+        /// Radiant intensity.
+        intensity: [f64; 3] = required(color("intensity").unit("W·sr⁻¹")),
     }
 }
 
@@ -34,12 +34,12 @@ record! {
         direction: Option<[f64; 3]> = optional(direction()),
         /// A point on the axis; either this or `direction`.
         towards: Option<[f64; 3]> = optional(point()),
-        /// Radiant intensity on the axis, W·sr⁻¹.
-        intensity: [f64; 3] = required(color("intensity")),
+        /// Radiant intensity on the axis.
+        intensity: [f64; 3] = required(color("intensity").unit("W·sr⁻¹")),
         /// Opening angle of the cone beyond which there is no light, from side to side, in degrees.
-        outer: f64 = required(real("opening angle in degrees").above(0.0).at_most(180.0)),
+        outer: f64 = required(real("opening angle in degrees").above(0.0).at_most(180.0).unit("°")),
         /// Opening angle of the cone within which the light is full, in degrees; 0.8 of `outer` if left out.
-        inner: Option<f64> = optional(real("opening angle in degrees").between(0.0, 180.0)),
+        inner: Option<f64> = optional(real("opening angle in degrees").between(0.0, 180.0).unit("°")),
     }
 }
 
@@ -48,8 +48,8 @@ record! {
     DirectionalLightFile {
         /// The direction in which the light travels.
         direction: [f64; 3] = required(direction()),
-        /// Irradiance on a surface that faces the light, W·m⁻².
-        irradiance: [f64; 3] = required(color("irradiance")),
+        /// Irradiance on a surface that faces the light.
+        irradiance: [f64; 3] = required(color("irradiance").unit("W·m⁻²")),
     }
 }
 
@@ -64,8 +64,8 @@ record! {
         towards: [f64; 3] = required(point()),
         /// Direction of the width; horizontal if left out.
         edge: Option<[f64; 3]> = optional(direction()),
-        /// Radiance, W·sr⁻¹·m⁻².
-        radiance: [f64; 3] = required(color("radiance")),
+        /// Radiance.
+        radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
     }
 }
 
@@ -78,8 +78,8 @@ record! {
         radius: f64 = required(real("radius in metres").positive_length()),
         /// A point the light faces.
         towards: [f64; 3] = required(point()),
-        /// Radiance, W·sr⁻¹·m⁻².
-        radiance: [f64; 3] = required(color("radiance")),
+        /// Radiance.
+        radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
     }
 }
 
@@ -90,7 +90,7 @@ record! {
         center: [f64; 3] = required(point()),
         /// Radius in metres.
         radius: f64 = required(real("radius in metres").positive_length()),
-        /// Radiance, W·sr⁻¹·m⁻².
-        radiance: [f64; 3] = required(color("radiance")),
+        /// Radiance.
+        radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
     }
 }

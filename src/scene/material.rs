@@ -3,6 +3,7 @@
 //! A material may be both: what scatters, where photons can rest, is its D part; what mirrors and refracts its S
 //! part.
 
+use super::Texture;
 use glam::{Vec2, Vec3};
 
 /// What a surface is made of.
@@ -191,20 +192,6 @@ impl Mix {
     }
 }
 
-/// A colour over a surface.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Texture {
-    /// The same everywhere.
-    Constant(Vec3),
-    /// A checkerboard in the surface's uv coordinates (metres on a polygon).
-    Checker {
-        /// Colours of the even and the odd squares.
-        colors: [Vec3; 2],
-        /// Side of a square, in uv units.
-        size: f32,
-    },
-}
-
 impl Material {
     /// Whether any of the light is mirrored or refracted: a path that meets it may meet an S.
     #[must_use]
@@ -262,32 +249,6 @@ impl Material {
             }
             Self::Phong(phong) => phong.emission + phong.ambient,
             Self::Mix(mix) => mix.shares(uv).into_iter().map(|(part, share)| part.glow(uv) * share).sum(),
-        }
-    }
-}
-
-impl Texture {
-    /// The colour at a surface point.
-    #[inline]
-    #[must_use]
-    pub fn eval(&self, uv: Vec2) -> Vec3 {
-        match self {
-            Self::Constant(color) => *color,
-            Self::Checker { colors, size } => {
-                let square = (uv / *size).floor();
-                // Parity of the sum; rem_euclid keeps it right for negative squares.
-                let odd = (square.x + square.y).rem_euclid(2.0) >= 1.0;
-                colors[usize::from(odd)]
-            }
-        }
-    }
-
-    /// True if no light is ever reflected.
-    #[must_use]
-    pub fn is_black(&self) -> bool {
-        match self {
-            Self::Constant(color) => *color == Vec3::ZERO,
-            Self::Checker { colors, .. } => colors.iter().all(|c| *c == Vec3::ZERO),
         }
     }
 }

@@ -7,26 +7,33 @@ pub mod assets;
 mod camera;
 mod check;
 mod compile;
+mod environment;
 mod file;
 mod issue;
 mod json;
 mod light;
 mod light_file;
 mod material;
+mod material_file;
 mod mesh_file;
 mod read;
+mod schema;
 mod shape_file;
+mod texture;
 
-pub use assets::{AssetError, AssetSource, DirectoryAssets, NoAssets};
+pub use assets::{AssetError, AssetSource, DirectoryAssets, MemoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection};
 pub use check::Warning;
+pub use environment::{Environment, EnvironmentImage, EnvironmentSample};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
-pub use material::{Alpha, Conductor, Dielectric, FRAUNHOFER, Highlight, Ior, Material, Mix, Phong, Texture};
+pub use material::{Alpha, Conductor, Dielectric, FRAUNHOFER, Highlight, Ior, Material, Mix, Phong};
+pub use schema::{schema, schema_markdown};
+pub use texture::{Texture, TextureImage};
 
 use crate::geometry::{Geometry, Structure};
 use crate::radius::RadiusRule;
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 
 macro_rules! typed_id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -74,8 +81,10 @@ pub struct Scene {
     pub geometry: Geometry,
     /// All lights but the environment.
     pub lights: Vec<Light>,
-    /// Radiance of the constant environment, W·sr⁻¹·m⁻².
-    pub environment: Vec3,
+    /// What surrounds it all.
+    pub environment: Environment,
+    /// Bytes of the pictures that textures and environment are made of.
+    pub image_bytes: u64,
     /// What the file asks of the renderer.
     pub render: RenderSettings,
     /// What is allowed, but hardly meant.

@@ -1,9 +1,8 @@
 //! The shapes of the scene file: exactly what the JSON says, nothing computed.
 
-use super::json::{Node, Value};
 use super::read::{
-    Context, Decode, direction, list, name, object, optional, or, point, real, record, required, scale,
-    scale3, size2, size3, tagged, triangle, uv,
+    Scale, direction, list, name, object, optional, or, point, real, record, required, size2, size3, tagged,
+    triangle, uv,
 };
 
 tagged! {
@@ -62,7 +61,7 @@ record! {
         /// Its extent along x and z.
         size: [f64; 2] = required(size2()),
         /// Rows from low to high z, each from low to high x: heights above the centre.
-        heights: Vec<Vec<f64>> = required(list(2, list(2, real("height in metres")))),
+        heights: Vec<Vec<f64>> = required(list(2, list(2, real("height in metres").unit("m")))),
     }
 }
 
@@ -102,7 +101,7 @@ record! {
         /// The axis.
         axis: [f64; 3] = or(direction(), [0.0, 1.0, 0.0]),
         /// Degrees, anticlockwise seen against the axis.
-        angle: f64 = required(real("angle in degrees").between(-3600.0, 3600.0)),
+        angle: f64 = required(real("angle in degrees").between(-3600.0, 3600.0).unit("°")),
     }
 }
 
@@ -139,19 +138,5 @@ record! {
         normals: Option<Vec<[f64; 3]>> = optional(list(3, direction())),
         /// Texture coordinates per vertex.
         uvs: Option<Vec<[f64; 2]>> = optional(list(3, uv())),
-    }
-}
-
-/// One scale, or one for each axis.
-struct Scale;
-
-impl Decode for Scale {
-    type Out = [f64; 3];
-
-    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<[f64; 3]> {
-        match node.value {
-            Value::Array(_) => scale3().decode(node, cx),
-            _ => scale().decode(node, cx).map(|s| [s; 3]),
-        }
     }
 }

@@ -19,6 +19,17 @@ async fn every_sample_scene_can_be_planned() {
 }
 
 #[tokio::test]
+async fn the_schema_says_what_a_scene_may_hold() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &[]);
+    let response = server.get("/v1/schema").await;
+    assert_eq!(response.headers()["content-type"], "application/schema+json");
+    let schema: serde_json::Value = response.json().await.unwrap();
+    assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
+    assert_eq!(schema["properties"]["nephroid"]["const"], 1);
+}
+
+#[tokio::test]
 async fn the_page_runs_nothing_but_its_own_files() {
     let data = tempfile::tempdir().unwrap();
     let server = Server::start(data.path(), &[]);

@@ -1,8 +1,8 @@
 //! The scene file: what is read, and that every error is found, named and placed.
 
 use nephroid::scene::{
-    AssetError, AssetSource, Dielectric, DirectoryAssets, Ior, IssueCode, Light, Material, NoAssets, Paths,
-    Scene, SceneErrors, Stop, Texture, Tone,
+    AssetError, AssetSource, Dielectric, DirectoryAssets, Environment, Ior, IssueCode, Light, Material,
+    NoAssets, Paths, Scene, SceneErrors, Stop, Texture, Tone,
 };
 use std::borrow::Cow;
 
@@ -54,7 +54,7 @@ fn a_scene_is_compiled_as_it_is_written() {
     assert_eq!(scene.render.paths, Paths::Whitted);
     assert_eq!(scene.render.stop, Stop { error: None, seconds: None, rounds: Some(8) });
     assert_eq!(scene.render.seed, u64::MAX);
-    assert_eq!(scene.environment.to_array(), [0.1, 0.2, 0.3]);
+    assert_eq!(scene.environment, Environment::Constant(glam::Vec3::new(0.1, 0.2, 0.3)));
     let Material::Diffuse { albedo: Texture::Checker { colors, size } } = &scene.materials[0] else {
         panic!("a checkerboard: {:?}", scene.materials[0])
     };
@@ -73,7 +73,7 @@ fn what_is_left_out_has_its_default() {
     assert_eq!((scene.image.width, scene.image.height, scene.image.tone), (640, 480, Tone::Linear));
     assert_eq!(scene.render.stop, Stop::default());
     assert_eq!((scene.render.paths, scene.render.seed), (Paths::Caustics, 0));
-    assert_eq!(scene.environment.to_array(), [0.0; 3]);
+    assert!(scene.environment.is_black());
     assert_eq!(scene.camera.up.to_array(), [0.0, 1.0, 0.0]);
 }
 

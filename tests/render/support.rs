@@ -44,7 +44,11 @@ pub(crate) fn compile(value: &Value) -> Scene {
 
 /// Renders `rounds` rounds with 2^`log2_photons` photons per window and half in each.
 pub(crate) fn render(value: &Value, seed: u64, rounds: u32, log2_photons: u32) -> Render {
-    let mut scene = compile(value);
+    render_scene(compile(value), seed, rounds, log2_photons)
+}
+
+/// The same of a compiled scene.
+pub(crate) fn render_scene(mut scene: Scene, seed: u64, rounds: u32, log2_photons: u32) -> Render {
     scene.render.seed = seed;
     let mut plan = Plan::new(&scene);
     plan.photons.iter_mut().for_each(|budget| budget.log2_block = log2_photons);

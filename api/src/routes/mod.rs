@@ -31,6 +31,7 @@ pub fn router(state: AppState) -> Router {
         .route("/v1/renders/{id}/preview.png", get(pictures::get_preview))
         .route("/v1/renders/{id}/layers/{file}", get(pictures::get_layer))
         .route("/v1/plans", post(plans::create_plan))
+        .route("/v1/schema", get(scenes::get_schema))
         .route("/v1/scenes", get(scenes::list_scenes))
         .route("/v1/scenes/{name}", get(scenes::get_scene))
         .route("/v1/scenes/{name}/picture.png", get(scenes::get_scene_picture))

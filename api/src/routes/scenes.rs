@@ -1,11 +1,12 @@
-//! `/v1/scenes`: the sample scenes.
+//! `/v1/scenes`: the sample scenes. `/v1/schema`: what a scene may hold.
 
-use super::renders::json_response;
+use super::renders::{json_response, not_modified};
+use crate::engine;
 use crate::problem::Problem;
 use crate::samples;
 use crate::wire::SampleView;
 use axum::extract::Path;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
@@ -31,6 +32,14 @@ pub(super) async fn get_scene_picture(Path(name): Path<String>) -> Result<Respon
     let picture = samples::find(&name).and_then(|sample| sample.picture()).ok_or_else(unknown)?;
     let head = [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "max-age=3600")];
     Ok((head, picture).into_response())
+}
+
+/// `GET /v1/schema`
+pub(super) async fn get_schema(headers: HeaderMap) -> Response {
+    let mut response = json_response(StatusCode::OK, &engine::scene_schema());
+    let kind = HeaderValue::from_static("application/schema+json");
+    response.headers_mut().insert(header::CONTENT_TYPE, kind);
+    not_modified(&headers, response)
 }
 
 fn unknown() -> Problem {

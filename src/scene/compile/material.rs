@@ -1,7 +1,7 @@
 //! Materials of the scene file.
 
-use super::super::file::{AlbedoFile, AmountFile, GlassFile, MaterialFile, MetalFile, MixFile, PhongFile};
 use super::super::issue::{IssueCode, pointer_step};
+use super::super::material_file::{AmountFile, GlassFile, MaterialFile, MetalFile, MixFile, PhongFile};
 use super::super::{Alpha, Conductor, Dielectric, Ior, Material, Mix, Phong, Texture};
 use super::{Compiler, vec3};
 use glam::Vec3;
@@ -10,7 +10,9 @@ impl Compiler<'_> {
     /// A material that is no mix; `None` if it is wrong, which has then been noted, or a mix.
     pub(super) fn material(&mut self, name: &str, material: &MaterialFile) -> Option<Material> {
         Some(match material {
-            MaterialFile::Diffuse(diffuse) => Material::Diffuse { albedo: texture(&diffuse.albedo) },
+            MaterialFile::Diffuse(diffuse) => {
+                Material::Diffuse { albedo: self.texture(&diffuse.albedo, &material_field(name, "albedo"))? }
+            }
             MaterialFile::Mirror(mirror) => Material::Mirror { reflectance: vec3(mirror.reflectance) },
             MaterialFile::Metal(metal) => Material::Metal {
                 conductor: self.conductor(name, metal)?,
@@ -20,7 +22,13 @@ impl Compiler<'_> {
                 dielectric: self.dielectric(name, glass)?,
                 alpha: Alpha::of_roughness(glass.roughness as f32),
             },
-            MaterialFile::Phong(phong) => Material::Phong(Box::new(lecture(phong))),
+            MaterialFile::Phong(phong) => {
+                let k_d = match &phong.k_d {
+                    Some(albedo) => self.texture(albedo, &material_field(name, "k_d"))?,
+                    None => Texture::Constant(Vec3::ZERO),
+                };
+                Material::Phong(Box::new(lecture(phong, k_d)))
+            }
             MaterialFile::Mix(_) => return None,
         })
     }
@@ -36,7 +44,7 @@ impl Compiler<'_> {
         }
         let amount = match &mix.amount {
             AmountFile::Number(share) => Texture::Constant(Vec3::splat(*share as f32)),
-            AmountFile::Pattern(pattern) => texture(pattern),
+            AmountFile::Pattern(pattern) => self.texture(pattern, &material_field(name, "amount"))?,
         };
         Some(Material::Mix(Box::new(Mix { parts: [first, second], amount })))
     }
@@ -92,26 +100,17 @@ impl Compiler<'_> {
     }
 }
 
-fn lecture(phong: &PhongFile) -> Phong {
+fn lecture(phong: &PhongFile, k_d: Texture) -> Phong {
     Phong {
         emission: vec3(phong.emission),
         ambient: vec3(phong.k_a) * vec3(phong.ambient),
-        k_d: texture(&phong.k_d),
+        k_d,
         k_s: vec3(phong.k_s),
         exponent: phong.n as f32,
         highlight: phong.highlight,
         k_r: vec3(phong.k_r),
         k_t: vec3(phong.k_t),
         dielectric: Dielectric { ior: Ior::Constant(phong.ior as f32), absorption: Vec3::ZERO, priority: 0 },
-    }
-}
-
-fn texture(albedo: &AlbedoFile) -> Texture {
-    match albedo {
-        AlbedoFile::Color(color) => Texture::Constant(vec3(*color)),
-        AlbedoFile::Checker(checker) => {
-            Texture::Checker { colors: checker.colors.map(vec3), size: checker.size as f32 }
-        }
     }
 }
 

@@ -5,7 +5,7 @@ use super::super::issue::{IssueCode, Issues};
 use super::super::mesh_file;
 use super::super::read::{MAX_LENGTH, MIN_LENGTH, quoted};
 use super::super::shape_file::MeshFile;
-use super::vec3;
+use super::{Refusal, vec3};
 use crate::geometry::MeshData;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
@@ -20,9 +20,6 @@ pub(super) struct MeshLoader<'a> {
     loaded: HashMap<String, Result<Rc<MeshData>, Refusal>>,
     triangles: usize,
 }
-
-/// Why an asset is refused.
-type Refusal = (IssueCode, String);
 
 impl<'a> MeshLoader<'a> {
     pub(super) fn new(assets: &'a dyn AssetSource) -> Self {

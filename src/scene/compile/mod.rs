@@ -3,17 +3,20 @@
 
 mod camera;
 mod emission;
+mod environment;
 mod light;
 mod material;
 mod mesh;
 mod motion;
 mod polygon;
 mod shape;
+mod texture;
 
 use super::assets::AssetSource;
-use super::file::{ImageFile, MaterialFile, ObjectFile, RenderFile, SceneFile, StopFile, read_scene_file};
+use super::file::{ImageFile, ObjectFile, RenderFile, SceneFile, StopFile, read_scene_file};
 use super::issue::{IssueCode, Issues, SceneErrors};
 use super::json::{ParseError, ParseErrorKind, parse};
+use super::material_file::MaterialFile;
 use super::shape_file::ShapeFile;
 use super::{
     ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Tone, Warning,
@@ -24,9 +27,10 @@ use glam::{DAffine3, DVec3, Vec3};
 use mesh::MeshLoader;
 use shape::Originals;
 use std::collections::HashMap;
+use texture::TextureLoader;
 
 impl Scene {
-    /// Reads and compiles a scene file; `assets` gives the meshes that it names.
+    /// Reads and compiles a scene file; `assets` gives the files that it names.
     ///
     /// # Errors
     /// Everything that is wrong with the scene, at once.
@@ -57,7 +61,9 @@ fn note_parse_error(error: ParseError, issues: &mut Issues) {
 fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> Option<Scene> {
     let mut compiler = Compiler {
         issues,
+        assets,
         meshes: MeshLoader::new(assets),
+        textures: TextureLoader::new(assets),
         originals: Originals::new(file.objects.as_deref().unwrap_or_default()),
         material_ids: HashMap::new(),
         materials: Vec::new(),
@@ -76,9 +82,11 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
     compiler.objects(file.objects.as_deref().unwrap_or_default());
     compiler.lights(file.lights.as_deref().unwrap_or_default());
     let render = file.render.as_ref().and_then(|render| compiler.render(render));
+    let environment = compiler.environment(file.environment.as_ref().and_then(Option::as_ref));
     if compiler.issues.count() > 0 {
         return None;
     }
+    let environment = environment?;
     Some(Scene {
         name: file.name.clone()?.unwrap_or_default(),
         image,
@@ -87,16 +95,22 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         objects: compiler.objects,
         geometry: compiler.geometry.build_as(render.as_ref()?.structure),
         lights: compiler.lights,
-        environment: file.environment.as_ref()?.as_ref().map_or(Vec3::ZERO, |e| vec3(e.radiance)),
+        image_bytes: compiler.textures.memory_bytes() + environment.memory_bytes(),
+        environment,
         render: render?,
         warnings: compiler.warnings,
     })
 }
 
+/// Why an asset is refused.
+type Refusal = (IssueCode, String);
+
 /// The scene while it grows.
 struct Compiler<'f> {
     issues: &'f mut Issues,
+    assets: &'f dyn AssetSource,
     meshes: MeshLoader<'f>,
+    textures: TextureLoader<'f>,
     originals: Originals<'f>,
     material_ids: HashMap<&'f str, MaterialId>,
     materials: Vec<Material>,

@@ -45,12 +45,15 @@ impl<'f> Originals<'f> {
     }
 }
 
-/// The outlines of a box's six sides, seen from outside.
+/// The outlines of a box's six sides, seen from outside. Each begins where a picture on it has its lower left
+/// corner: upright on the four walls, with x to the right on top and bottom.
 pub(super) fn sides(file: &BoxFile) -> [[DVec3; 4]; 6] {
     let (center, half) = (DVec3::from(file.center), DVec3::from(file.size) * 0.5);
     std::array::from_fn(|side| {
         let (axis, sign) = (side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
-        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(a, b)| {
+        let mut corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        corners.rotate_left([3, 1, 1, 1, 0, 0][side]);
+        corners.map(|(a, b)| {
             let mut p = DVec3::ZERO;
             // Of the two directions within the side one is turned with the sign, so that all face outwards.
             (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (sign, a * sign, b);

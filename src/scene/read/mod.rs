@@ -3,13 +3,16 @@
 //! A type of the file is declared once, with [`record!`] or [`tagged!`]: name, type and rule of each
 //! field. A rule ([`Rule`]) says whether the field must be there; a decoder ([`Decode`]) says what its
 //! value may be. A value that is wrong is noted in [`Issues`] and reading goes on, so that all errors
-//! of a scene are found at once.
+//! of a scene are found at once. The same declarations, with their doc comments, are the JSON Schema
+//! ([`super::schema`]).
 
+mod color;
 mod numbers;
 mod structure;
 
+pub(super) use color::color;
 pub(super) use numbers::{
-    MAX_LENGTH, MIN_LENGTH, color, count, direction, pair, point, real, scale, scale3, seed, size2, size3, uv,
+    MAX_LENGTH, MIN_LENGTH, Scale, count, direction, pair, point, real, seed, size2, size3, uv,
 };
 pub(super) use structure::{
     choice, list, name, named, object, optional, or, part, reference, required, slots, triangle,
@@ -17,6 +20,7 @@ pub(super) use structure::{
 
 use super::issue::{IssueCode, Issues, pointer_step, suggestion};
 use super::json::{Member, Node, Value};
+use super::schema::{Definitions, Presence, Variant};
 use std::collections::{BTreeSet, HashSet};
 
 /// Longest part of a user's own string that is quoted in a message or a pointer.
@@ -28,6 +32,14 @@ pub(super) trait Decode {
     type Out;
     /// Reads the value; `None` if it is wrong, which has then been noted in `cx`.
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<Self::Out>;
+    /// The JSON Schema of the values that are right.
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value;
+}
+
+/// A decoder whose values can be written: one of a field with a default.
+pub(super) trait Encode: Decode {
+    /// The JSON that reads as `value`.
+    fn encode(&self, value: &Self::Out) -> serde_json::Value;
 }
 
 /// Says what a field of a record becomes, there or not.
@@ -36,12 +48,20 @@ pub(super) trait Rule {
     type Out;
     /// Reads the field called `name`; `None` if it is wrong, which has then been noted.
     fn take(&self, name: &'static str, fields: &mut Fields<'_, '_, '_>) -> Option<Self::Out>;
+    /// The JSON Schema of the field's value, and whether it must be there.
+    fn schema(&self, definitions: &mut Definitions) -> (serde_json::Value, Presence);
 }
 
 /// Something read from the fields of a JSON object.
 pub(super) trait Record: Sized {
+    /// The type's own name, which ends in `File`.
+    const NAME: &'static str;
+    /// What it is, for the readers of the format.
+    const DOC: &'static str;
     /// Takes its fields; `None` if something was wrong, which has then been noted.
     fn read(fields: &mut Fields<'_, '_, '_>) -> Option<Self>;
+    /// The fields it may have: one list, or one for each value of `type`.
+    fn variants(definitions: &mut Definitions) -> Vec<Variant>;
 }
 
 /// Where the reader is, what it has found wrong, and the names that values may refer to.
@@ -194,26 +214,38 @@ pub(super) fn quoted(text: &str) -> String {
     }
 }
 
-/// Declares a struct of the scene file: each field with its type and the [`Rule`] it is read by.
+/// Declares a struct of the scene file: each field with its type and the [`Rule`] it is read by. The doc
+/// comments are also the descriptions in the JSON Schema.
 ///
 /// A last field after `..` is a record of its own whose fields stand in the same JSON object.
 macro_rules! record {
-    ($(#[$doc:meta])* $record:ident {
-        $($(#[$field_doc:meta])* $field:ident: $type:ty = $rule:expr,)*
-        $(..$(#[$inner_doc:meta])* $inner:ident: $inner_type:ty)?
+    ($(#[doc = $doc:literal])* $record:ident {
+        $($(#[doc = $field_doc:literal])* $field:ident: $type:ty = $rule:expr,)*
+        $(..$(#[doc = $inner_doc:literal])* $inner:ident: $inner_type:ty)?
     }) => {
-        $(#[$doc])*
+        $(#[doc = $doc])*
         #[derive(Clone, Debug, PartialEq)]
         pub(super) struct $record {
-            $($(#[$field_doc])* pub(super) $field: $type,)*
-            $($(#[$inner_doc])* pub(super) $inner: $inner_type,)?
+            $($(#[doc = $field_doc])* pub(super) $field: $type,)*
+            $($(#[doc = $inner_doc])* pub(super) $inner: $inner_type,)?
         }
 
         impl $crate::scene::read::Record for $record {
+            const NAME: &'static str = stringify!($record);
+            const DOC: &'static str = concat!($($doc),*);
+
             fn read(fields: &mut $crate::scene::read::Fields<'_, '_, '_>) -> Option<Self> {
                 $(let $field = $crate::scene::read::Rule::take(&$rule, stringify!($field), fields);)*
                 $(let $inner = <$inner_type as $crate::scene::read::Record>::read(fields);)?
                 Some(Self { $($field: $field?,)* $($inner: $inner?,)? })
+            }
+
+            fn variants(
+                definitions: &mut $crate::scene::schema::Definitions,
+            ) -> Vec<$crate::scene::schema::Variant> {
+                let fields = vec![$(definitions.field(stringify!($field), concat!($($field_doc),*), &$rule)),*];
+                let inner = vec![$(<$inner_type as $crate::scene::read::Record>::variants(definitions))?];
+                $crate::scene::schema::Variant::of(Self::DOC, fields, inner)
             }
         }
     };
@@ -221,19 +253,33 @@ macro_rules! record {
 
 /// Declares an enum of records, chosen by the field `type`.
 macro_rules! tagged {
-    ($(#[$doc:meta])* $enum:ident { $($tag:literal => $variant:ident($record:ty),)* }) => {
-        $(#[$doc])*
+    ($(#[doc = $doc:literal])* $enum:ident { $($tag:literal => $variant:ident($record:ty),)* }) => {
+        $(#[doc = $doc])*
         #[derive(Clone, Debug, PartialEq)]
         pub(super) enum $enum {
             $($variant($record),)*
         }
 
         impl $crate::scene::read::Record for $enum {
+            const NAME: &'static str = stringify!($enum);
+            const DOC: &'static str = concat!($($doc),*);
+
             fn read(fields: &mut $crate::scene::read::Fields<'_, '_, '_>) -> Option<Self> {
                 match fields.tag("type", &[$($tag),*])? {
                     $($tag => <$record as $crate::scene::read::Record>::read(fields).map(Self::$variant),)*
                     _ => None,
                 }
+            }
+
+            fn variants(
+                definitions: &mut $crate::scene::schema::Definitions,
+            ) -> Vec<$crate::scene::schema::Variant> {
+                let mut variants = Vec::new();
+                $({
+                    let of_record = <$record as $crate::scene::read::Record>::variants(definitions);
+                    variants.extend(of_record.into_iter().map(|variant| variant.tagged($tag)));
+                })*
+                variants
             }
         }
     };

@@ -1,21 +1,21 @@
-//! Decoders of numbers, points, directions and colours.
+//! Decoders of numbers, points and directions.
 
 use super::super::issue::IssueCode;
 use super::super::json::{Node, Value};
-use super::{Context, Decode, Step, quoted};
-use crate::develop::srgb_to_linear;
+use super::super::schema::Definitions;
+use super::{Context, Decode, Encode, Step, quoted};
+use serde_json::json;
 
 /// Largest coordinate or length, in metres: its fourth power is still a float.
 pub(in crate::scene) const MAX_LENGTH: f64 = 1e9;
 /// Smallest length above zero, in metres.
 pub(in crate::scene) const MIN_LENGTH: f64 = 1e-9;
-/// Largest amount of light per channel, in whatever unit.
-const MAX_LIGHT: f64 = 1e12;
 
 /// A real number within limits.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct Real {
     what: &'static str,
+    unit: Option<&'static str>,
     low: Bound,
     high: Bound,
 }
@@ -28,10 +28,15 @@ enum Bound {
 
 /// Any coordinate.
 pub(in crate::scene) fn real(what: &'static str) -> Real {
-    Real { what, low: Bound::Closed(-MAX_LENGTH), high: Bound::Closed(MAX_LENGTH) }
+    Real { what, unit: None, low: Bound::Closed(-MAX_LENGTH), high: Bound::Closed(MAX_LENGTH) }
 }
 
 impl Real {
+    /// The unit it is given in, for the schema.
+    pub(in crate::scene) fn unit(self, unit: &'static str) -> Self {
+        Self { unit: Some(unit), ..self }
+    }
+
     /// From `low` to `high`, both allowed.
     pub(in crate::scene) fn between(self, low: f64, high: f64) -> Self {
         Self { low: Bound::Closed(low), high: Bound::Closed(high), ..self }
@@ -54,7 +59,7 @@ impl Real {
 
     /// A length above zero.
     pub(in crate::scene) fn positive_length(self) -> Self {
-        self.between(MIN_LENGTH, MAX_LENGTH)
+        self.between(MIN_LENGTH, MAX_LENGTH).unit("m")
     }
 
     fn allows(&self, x: f64) -> bool {
@@ -103,6 +108,34 @@ impl Decode for Real {
         }
         Some(x)
     }
+
+    fn schema(&self, _definitions: &mut Definitions) -> serde_json::Value {
+        let (low, at_low) = match self.low {
+            Bound::Closed(low) => ("minimum", low),
+            Bound::Open(low) => ("exclusiveMinimum", low),
+        };
+        let (high, at_high) = match self.high {
+            Bound::Closed(high) => ("maximum", high),
+            Bound::Open(high) => ("exclusiveMaximum", high),
+        };
+        let mut schema = json!({ "type": "number", low: number(at_low), high: number(at_high) });
+        if let Some(unit) = self.unit {
+            schema["x-unit"] = unit.into();
+        }
+        schema
+    }
+}
+
+impl Encode for Real {
+    fn encode(&self, value: &f64) -> serde_json::Value {
+        number(*value)
+    }
+}
+
+/// A number without a needless `.0`.
+pub(super) fn number(x: f64) -> serde_json::Value {
+    // Below 2^53 a whole float is exactly that integer.
+    if x.fract() == 0.0 && x.abs() < 9_007_199_254_740_992.0 { json!(x as i64) } else { json!(x) }
 }
 
 /// A limit as people write it.
@@ -147,6 +180,10 @@ impl Decode for Whole {
         }
         found
     }
+
+    fn schema(&self, _definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "type": "integer", "minimum": self.low, "maximum": self.high })
+    }
 }
 
 impl Decode for Count {
@@ -154,6 +191,22 @@ impl Decode for Count {
 
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<u32> {
         self.0.decode(node, cx).and_then(|n| u32::try_from(n).ok())
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        self.0.schema(definitions)
+    }
+}
+
+impl Encode for Whole {
+    fn encode(&self, value: &u64) -> serde_json::Value {
+        json!(value)
+    }
+}
+
+impl Encode for Count {
+    fn encode(&self, value: &u32) -> serde_json::Value {
+        json!(value)
     }
 }
 
@@ -203,11 +256,22 @@ impl<const N: usize, D: Decode<Out: Copy + Default>> Decode for Tuple<N, D> {
         }
         good.then_some(out)
     }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        let items = self.item.schema(definitions);
+        json!({ "title": self.what, "type": "array", "items": items, "minItems": N, "maxItems": N })
+    }
+}
+
+impl<const N: usize, D: Encode<Out: Copy + Default>> Encode for Tuple<N, D> {
+    fn encode(&self, value: &Self::Out) -> serde_json::Value {
+        value.iter().map(|item| self.item.encode(item)).collect()
+    }
 }
 
 /// A point in space.
 pub(in crate::scene) fn point() -> Tuple<3, Real> {
-    Tuple::new("a point [x, y, z]", real("coordinate"))
+    Tuple::new("a point [x, y, z]", real("coordinate").unit("m"))
 }
 
 /// Two values of one kind.
@@ -230,14 +294,49 @@ pub(in crate::scene) fn size3() -> Tuple<3, Real> {
     Tuple::new("a size [x, y, z]", real("length").positive_length())
 }
 
-/// A factor by which something is scaled.
-pub(in crate::scene) fn scale() -> Real {
-    real("scale").between(1e-6, 1e6)
+impl Encode for Direction {
+    fn encode(&self, value: &[f64; 3]) -> serde_json::Value {
+        value.iter().copied().map(number).collect()
+    }
 }
 
-/// A factor for each axis.
-pub(in crate::scene) fn scale3() -> Tuple<3, Real> {
-    Tuple::new("a scale or scales [x, y, z]", scale())
+/// One factor, or one for each of `N` axes.
+pub(in crate::scene) struct Scale<const N: usize>;
+
+impl<const N: usize> Scale<N> {
+    fn one() -> Real {
+        real("scale").between(1e-6, 1e6)
+    }
+
+    fn each() -> Tuple<N, Real> {
+        Tuple::new(
+            if N == 2 { "a scale or scales [u, v]" } else { "a scale or scales [x, y, z]" },
+            Self::one(),
+        )
+    }
+}
+
+impl<const N: usize> Decode for Scale<N> {
+    type Out = [f64; N];
+
+    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<[f64; N]> {
+        match node.value {
+            Value::Array(_) => Self::each().decode(node, cx),
+            Value::Null | Value::Bool | Value::Number(_) | Value::String(_) | Value::Object(_) => {
+                Self::one().decode(node, cx).map(|s| [s; N])
+            }
+        }
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "anyOf": [Self::one().schema(definitions), Self::each().schema(definitions)] })
+    }
+}
+
+impl<const N: usize> Encode for Scale<N> {
+    fn encode(&self, value: &[f64; N]) -> serde_json::Value {
+        Self::each().encode(value)
+    }
 }
 
 /// A vector that points somewhere; it need not have length 1.
@@ -260,65 +359,13 @@ impl Decode for Direction {
         }
         Some(vector)
     }
-}
 
-/// A colour: linear `[r, g, b]`, or `"#rrggbb"` in sRGB.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::scene) struct Color {
-    what: &'static str,
-    max: f64,
-}
-
-/// An amount of light per channel.
-pub(in crate::scene) fn color(what: &'static str) -> Color {
-    Color { what, max: MAX_LIGHT }
-}
-
-impl Color {
-    /// A fraction of the light, 0 to 1.
-    pub(in crate::scene) fn fraction(self) -> Self {
-        Self { max: 1.0, ..self }
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        let mut schema =
+            Tuple::<3, Real>::new("a direction [x, y, z]", real("coordinate")).schema(definitions);
+        schema["contains"] = json!({ "anyOf": [{ "minimum": MIN_LENGTH }, { "maximum": -MIN_LENGTH }] });
+        schema
     }
-}
-
-impl Color {
-    /// Up to `max` per channel.
-    pub(in crate::scene) fn up_to(self, max: f64) -> Self {
-        Self { max, ..self }
-    }
-}
-
-impl Decode for Color {
-    type Out = [f64; 3];
-
-    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<[f64; 3]> {
-        match &node.value {
-            Value::String(hex) => {
-                let color = hex_color(hex);
-                if color.is_none() {
-                    let message = format!("expected {}: \"#rrggbb\", found \"{}\"", self.what, quoted(hex));
-                    cx.issue(IssueCode::UnknownValue, message);
-                }
-                color
-            }
-            Value::Array(_) => {
-                Tuple::<3, Real>::new("a colour [r, g, b]", real(self.what).between(0.0, self.max))
-                    .decode(node, cx)
-            }
-            Value::Null | Value::Bool | Value::Number(_) | Value::Object(_) => {
-                cx.wrong_type(&format!("{}: a colour [r, g, b] or \"#rrggbb\"", self.what), node);
-                None
-            }
-        }
-    }
-}
-
-fn hex_color(text: &str) -> Option<[f64; 3]> {
-    let digits =
-        text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
-    let packed = u32::from_str_radix(digits, 16).ok()?;
-    let [_, r, g, b] = packed.to_be_bytes();
-    Some([r, g, b].map(|byte| srgb_to_linear(f64::from(byte) / 255.0)))
 }
 
 #[cfg(test)]
@@ -340,17 +387,6 @@ mod tests {
         ];
         for (written, expected) in cases {
             assert_eq!(whole(written), expected, "{written}");
-        }
-    }
-
-    #[test]
-    fn hexadecimal_colours_are_srgb() {
-        let [r, g, b] = hex_color("#ff0080").unwrap();
-        assert_eq!((r, g), (1.0, 0.0));
-        // The sRGB curve at 128/255.
-        assert!((b - 0.215_860_5).abs() < 1e-6, "{b}");
-        for bad in ["ff0080", "#ff008", "#ff00800", "#gg0000", "#", "", "#é00000", "#+12345"] {
-            assert_eq!(hex_color(bad), None, "{bad}");
         }
     }
 }

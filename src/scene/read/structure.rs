@@ -2,8 +2,10 @@
 
 use super::super::issue::{IssueCode, suggestion};
 use super::super::json::{Node, Value};
+use super::super::schema::{Definitions, Presence};
 use super::numbers::{Count, Tuple, count};
-use super::{Context, Decode, Fields, Record, Rule, Step, quoted};
+use super::{Context, Decode, Encode, Fields, Record, Rule, Step, quoted};
+use serde_json::json;
 use std::marker::PhantomData;
 
 /// Longest name.
@@ -20,7 +22,7 @@ pub(in crate::scene) fn optional<D: Decode>(decoder: D) -> Optional<D> {
 }
 
 /// The field may be left out and is then `default`.
-pub(in crate::scene) fn or<D: Decode<Out: Clone>>(decoder: D, default: D::Out) -> Or<D> {
+pub(in crate::scene) fn or<D: Encode<Out: Clone>>(decoder: D, default: D::Out) -> Or<D> {
     Or(decoder, default)
 }
 
@@ -44,6 +46,10 @@ impl<D: Decode> Rule for Required<D> {
         }
         value?
     }
+
+    fn schema(&self, definitions: &mut Definitions) -> (serde_json::Value, Presence) {
+        (self.0.schema(definitions), Presence::Required)
+    }
 }
 
 impl<D: Decode> Rule for Optional<D> {
@@ -55,13 +61,21 @@ impl<D: Decode> Rule for Optional<D> {
             None => Some(None),
         }
     }
+
+    fn schema(&self, definitions: &mut Definitions) -> (serde_json::Value, Presence) {
+        (self.0.schema(definitions), Presence::Optional)
+    }
 }
 
-impl<D: Decode<Out: Clone>> Rule for Or<D> {
+impl<D: Encode<Out: Clone>> Rule for Or<D> {
     type Out = D::Out;
 
     fn take(&self, name: &'static str, fields: &mut Fields<'_, '_, '_>) -> Option<D::Out> {
         fields.decode(name, &self.0).unwrap_or_else(|| Some(self.1.clone()))
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> (serde_json::Value, Presence) {
+        (self.0.schema(definitions), Presence::Default(self.0.encode(&self.1)))
     }
 }
 
@@ -70,6 +84,10 @@ impl<R: Rule> Rule for Part<R> {
 
     fn take(&self, name: &'static str, fields: &mut Fields<'_, '_, '_>) -> Option<Self::Out> {
         Some(self.0.take(name, fields))
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> (serde_json::Value, Presence) {
+        self.0.schema(definitions)
     }
 }
 
@@ -85,6 +103,17 @@ impl<T: Record> Decode for RecordOf<T> {
 
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<T> {
         Fields::read(node, cx)
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        definitions.refer::<T>()
+    }
+}
+
+impl<T: Record + Default + PartialEq> Encode for RecordOf<T> {
+    /// A record in which nothing is given, whose fields all have their defaults.
+    fn encode(&self, _value: &T) -> serde_json::Value {
+        json!({})
     }
 }
 
@@ -110,6 +139,16 @@ impl<D: Decode> Decode for List<D> {
         }
         slots.into_iter().collect()
     }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "type": "array", "items": self.item.schema(definitions), "minItems": self.min })
+    }
+}
+
+impl<D: Encode> Encode for List<D> {
+    fn encode(&self, value: &Self::Out) -> serde_json::Value {
+        value.iter().map(|item| self.item.encode(item)).collect()
+    }
 }
 
 /// A list in which each value is read for itself: the wrong ones become `None`.
@@ -130,6 +169,17 @@ impl<D: Decode> Decode for Slots<D> {
         let read = |(index, item)| cx.within(Step::Index(index), |cx| self.0.decode(item, cx));
         Some(items.iter().enumerate().map(read).collect())
     }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "type": "array", "items": self.0.schema(definitions) })
+    }
+}
+
+impl<D: Decode> Encode for Slots<D> {
+    /// As a default there is nothing in it.
+    fn encode(&self, _value: &Self::Out) -> serde_json::Value {
+        json!([])
+    }
 }
 
 impl<D: Decode> Decode for &D {
@@ -137,6 +187,10 @@ impl<D: Decode> Decode for &D {
 
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<D::Out> {
         (*self).decode(node, cx)
+    }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        (*self).schema(definitions)
     }
 }
 
@@ -164,6 +218,22 @@ impl<D: Decode> Decode for Named<D> {
         }
         Some(entries)
     }
+
+    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
+        let item = self.0.schema(definitions);
+        json!({ "type": "object", "propertyNames": name_schema(), "additionalProperties": item })
+    }
+}
+
+impl<D: Decode> Encode for Named<D> {
+    /// As a default there is nothing in it.
+    fn encode(&self, _value: &Self::Out) -> serde_json::Value {
+        json!({})
+    }
+}
+
+fn name_schema() -> serde_json::Value {
+    json!({ "type": "string", "minLength": 1, "maxLength": MAX_NAME })
 }
 
 /// A string that names something: not empty, not overlong.
@@ -185,6 +255,10 @@ impl Decode for Text {
         };
         Some(text.clone().into_owned())
     }
+
+    fn schema(&self, _definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "type": "string" })
+    }
 }
 
 impl Decode for Name {
@@ -193,6 +267,10 @@ impl Decode for Name {
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<String> {
         let name = Text.decode(node, cx)?;
         check_name(&name, cx).map(|()| name)
+    }
+
+    fn schema(&self, _definitions: &mut Definitions) -> serde_json::Value {
+        name_schema()
     }
 }
 
@@ -228,6 +306,10 @@ impl Decode for Reference {
         cx.issue(IssueCode::UnknownReference, message);
         None
     }
+
+    fn schema(&self, _definitions: &mut Definitions) -> serde_json::Value {
+        name_schema()
+    }
 }
 
 /// One of several words, each with what it stands for.
@@ -252,6 +334,19 @@ impl<T: Copy> Decode for Choice<T> {
             cx.issue(IssueCode::UnknownValue, message);
         }
         chosen
+    }
+
+    fn schema(&self, _definitions: &mut Definitions) -> serde_json::Value {
+        json!({ "enum": self.0.iter().map(|(word, _)| *word).collect::<Vec<_>>() })
+    }
+}
+
+impl<T: Copy + PartialEq> Encode for Choice<T> {
+    fn encode(&self, value: &T) -> serde_json::Value {
+        self.0
+            .iter()
+            .find(|(_, known)| known == value)
+            .map_or(serde_json::Value::Null, |(word, _)| json!(word))
     }
 }
 
