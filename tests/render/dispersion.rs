@@ -52,12 +52,9 @@ fn follow(scene: &Scene, mut ray: Ray, wavelength: f32, events: &[Event]) -> Vec
 
 /// Deviation of a ray that goes symmetrically through the prism for an index `n`, degrees.
 fn deviation(scene: &Scene, n: f64, wavelength: f32) -> f64 {
-    // The ray inside runs along x: it meets the left side at 30° inside, at asin(n / 2) outside.
-    let outside = (n * 0.5).asin();
-    let normal_angle = 150.0_f64.to_radians();
-    let angle = normal_angle - outside;
-    let toward = DVec3::new(-angle.cos(), -angle.sin(), 0.0);
-    let toward = DVec3::new(toward.x, -toward.y.abs() * -toward.y.signum().min(1.0), 0.0);
+    // The ray inside runs along x, 30° off the left side's normal; outside it rises toward it at asin(n / 2) from that.
+    let rises = (n * 0.5).asin() - 30.0_f64.to_radians();
+    let toward = DVec3::new(rises.cos(), rises.sin(), 0.0);
     let middle = DVec3::new(-0.5, 0.5 * 3.0_f64.sqrt(), 0.0);
     let ray = Ray::new((middle - toward * 3.0).as_vec3(), toward.as_vec3().normalize());
     let out = follow(scene, ray, wavelength, &[Event::Refraction, Event::Refraction]).as_dvec3();
@@ -111,7 +108,7 @@ fn f74_a_prism_throws_a_continuous_spectrum() {
     let screen = json!({ "name": "screen", "type": "polygon", "material": "floor",
         "vertices": [[20, -40, 9], [20, -40, -9], [20, 40, -9], [20, 40, 9]] });
     let beam = json!([{ "type": "spot", "position": [-3, -0.2, 0], "direction": [2.5, 1.0, 0],
-                        "intensity": [1, 1, 1], "outer": 0.02, "inner": 0.02 }]);
+                        "intensity": [1, 1, 1], "outer": 0.1, "inner": 0.1 }]);
     let mut value = scene(camera_above([0.0; 3], 9.0, 1.0), json!([left, right, screen]), beam);
     value["materials"]["prism"] = json!({ "type": "glass", "ior": 1.6, "abbe": 30 });
     let scene = compile(&value);

@@ -50,16 +50,14 @@ impl Compiler<'_> {
     }
 
     fn part(&mut self, name: &str, field: &str, part: &str) -> Option<Material> {
-        // The reader has refused names that no material has; what is missing here is a mix, or wrong.
-        let id = self.material_ids.get(part)?;
-        match self.materials.get(id.index())? {
-            Material::Mix(_) => {
-                let message = format!("`{part}` is a mix itself: name its parts");
-                self.issues.add(material_field(name, field), IssueCode::ConflictingFields, message);
-                None
-            }
-            material => Some(material.clone()),
+        if self.mixes.contains(part) {
+            let message = format!("`{part}` is a mix itself: name its parts");
+            self.issues.add(material_field(name, field), IssueCode::ConflictingFields, message);
+            return None;
         }
+        // The reader has refused names that no material has; what is missing here has been noted as wrong.
+        let id = self.material_ids.get(part)?;
+        self.materials.get(id.index()).cloned()
     }
 
     fn conductor(&mut self, name: &str, metal: &MetalFile) -> Option<Conductor> {

@@ -26,7 +26,7 @@ use crate::media::MOST_MATERIALS;
 use glam::{DAffine3, DVec3, Vec3};
 use mesh::MeshLoader;
 use shape::Originals;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use texture::TextureLoader;
 
 impl Scene {
@@ -66,6 +66,7 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         textures: TextureLoader::new(assets),
         originals: Originals::new(file.objects.as_deref().unwrap_or_default()),
         material_ids: HashMap::new(),
+        mixes: HashSet::new(),
         materials: Vec::new(),
         objects: Vec::new(),
         geometry: GeometryBuilder::default(),
@@ -113,6 +114,7 @@ struct Compiler<'f> {
     textures: TextureLoader<'f>,
     originals: Originals<'f>,
     material_ids: HashMap<&'f str, MaterialId>,
+    mixes: HashSet<&'f str>,
     materials: Vec<Material>,
     objects: Vec<Object>,
     geometry: GeometryBuilder,
@@ -137,6 +139,8 @@ impl<'f> Compiler<'f> {
             }
         }
         // Mixes name others, which may stand behind them.
+        let is_mix = |material: &MaterialFile| matches!(material, MaterialFile::Mix(_));
+        self.mixes = given().filter(|(_, m)| is_mix(m)).map(|(name, _)| name.as_str()).collect();
         for (name, material) in given() {
             if let MaterialFile::Mix(mix) = material
                 && let Some(material) = self.mix(name, mix)
