@@ -4,7 +4,7 @@
 //! every machine.
 
 use flate2::{Compression, write::GzEncoder};
-use glam::{DVec3, dvec3};
+use glam::{DVec2, DVec3, dvec3};
 use std::f64::consts::TAU;
 use std::io::{self, Write};
 use std::path::Path;
@@ -16,8 +16,27 @@ fn main() -> io::Result<()> {
     let folder = Path::new("scenes/meshes");
     std::fs::create_dir_all(folder)?;
     std::fs::write(folder.join("ring.ply.gz"), ring().compressed()?)?;
-    std::fs::write(folder.join("water.ply.gz"), water().compressed()?)
+    std::fs::write(folder.join("water.ply.gz"), water().compressed()?)?;
+    std::fs::write(folder.join("tumbler.ply.gz"), lathe(&TUMBLER).compressed()?)?;
+    std::fs::write(folder.join("tea.ply.gz"), lathe(&TEA).compressed()?)
 }
+
+/// Outline of a tumbler, radius and height: up the outside, over the rim, down the inside.
+const TUMBLER: [[f64; 2]; 10] = [
+    [0.0, 0.002],
+    [0.33, 0.002],
+    [0.36, 0.02],
+    [0.43, 0.95],
+    [0.424, 0.966],
+    [0.406, 0.966],
+    [0.4, 0.95],
+    [0.335, 0.09],
+    [0.31, 0.07],
+    [0.0, 0.07],
+];
+
+/// Outline of the tea in it. It reaches into the glass by about half the wall, so that there is no gap between them.
+const TEA: [[f64; 2]; 4] = [[0.0, 0.05], [0.343, 0.05], [0.392, 0.62], [0.0, 0.62]];
 
 struct Mesh {
     positions: Vec<DVec3>,
@@ -59,6 +78,33 @@ fn water() -> Mesh {
         normals: grid().map(|(x, z)| wave(x, z).1).collect(),
         triangles: squares.collect(),
     }
+}
+
+/// A surface of revolution about y, whose outline runs so that its outside is on the right. Normals are smooth around
+/// the axis and creased along the outline.
+fn lathe(outline: &[[f64; 2]]) -> Mesh {
+    const SEGMENTS: u32 = 256;
+    let mut mesh = Mesh { positions: Vec::new(), normals: Vec::new(), triangles: Vec::new() };
+    for pair in outline.windows(2) {
+        let (low, high) = (DVec2::from(pair[0]), DVec2::from(pair[1]));
+        let along = (high - low).normalize();
+        let first = mesh.positions.len() as u32;
+        for i in 0..SEGMENTS {
+            let (sin, cos) = libm::sincos(TAU * f64::from(i) / f64::from(SEGMENTS));
+            for point in [low, high] {
+                mesh.positions.push(dvec3(point.x * cos, point.y, point.x * sin));
+                mesh.normals.push(dvec3(along.y * cos, -along.x, along.y * sin));
+            }
+            let (a, b) = (first + 2 * i, first + 2 * ((i + 1) % SEGMENTS));
+            if low.x > 0.0 {
+                mesh.triangles.push([a, a + 1, b]);
+            }
+            if high.x > 0.0 {
+                mesh.triangles.push([a + 1, b + 1, b]);
+            }
+        }
+    }
+    mesh
 }
 
 /// Height and normal of the water.
