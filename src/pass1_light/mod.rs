@@ -15,9 +15,10 @@ pub use window::{Region, Source, Window, windows};
 use crate::photon_map::{Photon, PhotonMap};
 use crate::render::{Control, RenderError};
 use crate::sampling::{SamplePoint, hash};
-use crate::scene::Scene;
+use crate::scene::{ObjectId, Scene};
 use guide::Lesson;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use walk::{Fate, walk};
 
 /// Pilot photons draw their time from this dimension; no event does (see `walk`).
@@ -175,18 +176,20 @@ fn trace_batch(
         photon.power *= share;
         photon.ray.time = time;
         tally.energy.emitted += photon.power.as_dvec3();
-        if let Fate::Stored(stored) = walk(scene, emission.caster(), photon, sample, &mut tally) {
+        if let Fate::Stored(stored) = walk(scene, emission.caster(), photon, sample, &mut tally, |_| {}) {
             photons.push(stored);
         }
     }
     (photons, tally)
 }
 
-/// Sends a block of pilot photons through a window, and learns where those come from that arrive.
+/// Sends a block of pilot photons through a window, and learns where those come from that arrive, and which S they
+/// meet.
 #[must_use]
-pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Guide>) {
+pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Guide>, BTreeSet<ObjectId>) {
     let emission = Emission::new(scene, window);
     let mut lesson = Lesson::new();
+    let mut met = BTreeSet::new();
     let mut tally = Tally::default();
     for i in 0..block.count {
         let sample = SamplePoint::new(block.seed, block.first.wrapping_add(i));
@@ -196,9 +199,10 @@ pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Gui
         // A table serves all rounds: it is learned over the whole time that the shutter is open.
         photon.ray.time = sample.get(TIME_DIMENSION);
         tally.energy.emitted += photon.power.as_dvec3();
-        if let Fate::Stored(stored) = walk(scene, emission.caster(), photon, sample, &mut tally) {
+        let meets = |object| _ = met.insert(object);
+        if let Fate::Stored(stored) = walk(scene, emission.caster(), photon, sample, &mut tally, meets) {
             lesson.delivered(sample.get_2d(0), stored.power.element_sum());
         }
     }
-    (tally, lesson.learn())
+    (tally, lesson.learn(), met)
 }

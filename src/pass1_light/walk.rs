@@ -35,13 +35,14 @@ pub(super) enum Fate {
     Gone,
 }
 
-/// Traces one photon. Its first surface must be the window's caster.
+/// Traces one photon. Its first surface must be the window's caster; `meets` is told each S on the way.
 pub(super) fn walk(
     scene: &Scene,
     caster: ObjectId,
     photon: EmittedPhoton,
     sample: SamplePoint,
     tally: &mut Tally,
+    mut meets: impl FnMut(ObjectId),
 ) -> Fate {
     let EmittedPhoton { mut ray, mut power } = photon;
     let first_power = power.max_element();
@@ -78,6 +79,7 @@ pub(super) fn walk(
             tally.energy.stored += power.as_dvec3();
             return Fate::Stored(at_rest(&ray, &hit, power));
         };
+        meets(hit.object);
         let u = sample.get(event_dimension(bounce));
         let Some((outcome, weight)) = choose(&interaction, u) else {
             tally.energy.absorbed += power.as_dvec3();

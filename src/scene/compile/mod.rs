@@ -2,6 +2,7 @@
 //! needs more than one field.
 
 mod camera;
+mod checks;
 mod emission;
 mod light;
 mod material;
@@ -23,6 +24,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use mesh::MeshLoader;
 use shape::Originals;
 use std::collections::HashMap;
+use std::mem::take;
 
 impl Scene {
     /// Reads and compiles a scene file; `assets` gives the meshes that it names.
@@ -65,6 +67,7 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         lights: Vec::new(),
         shutter: [0.0; 2],
         warnings: Vec::new(),
+        light_places: Vec::new(),
     };
     let image = image_settings(file.image.as_ref().and_then(Option::as_ref));
     let camera = file.camera.as_ref().and_then(|camera| {
@@ -78,18 +81,20 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
     if compiler.issues.count() > 0 {
         return None;
     }
-    Some(Scene {
+    let mut scene = Scene {
         name: file.name.clone()?.unwrap_or_default(),
         image,
         camera: camera?,
-        materials: compiler.materials,
-        objects: compiler.objects,
-        geometry: compiler.geometry.build_as(render.as_ref()?.structure),
-        lights: compiler.lights,
+        materials: take(&mut compiler.materials),
+        objects: take(&mut compiler.objects),
+        geometry: take(&mut compiler.geometry).build_as(render.as_ref()?.structure),
+        lights: take(&mut compiler.lights),
         environment: file.environment.as_ref()?.as_ref().map_or(Vec3::ZERO, |e| vec3(e.radiance)),
         render: render?,
-        warnings: compiler.warnings,
-    })
+        warnings: Vec::new(),
+    };
+    scene.warnings = compiler.checks(file.objects.as_deref().unwrap_or_default(), &scene);
+    Some(scene)
 }
 
 /// The scene while it grows.
@@ -105,6 +110,8 @@ struct Compiler<'f> {
     /// When the shutter opens and closes, s.
     shutter: [f64; 2],
     warnings: Vec<Warning>,
+    /// Where in the file each light is, as a JSON pointer.
+    light_places: Vec<String>,
 }
 
 impl<'f> Compiler<'f> {
