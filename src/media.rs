@@ -22,6 +22,15 @@ const LANE: u32 = 16;
 /// Materials that can be told apart.
 pub const MOST_MATERIALS: usize = (1 << LANE) - 1;
 
+/// A dielectric's surface that a ray meets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crossed {
+    /// The dielectric.
+    pub material: MaterialId,
+    /// The ray comes from within.
+    pub leaving: bool,
+}
+
 /// A surface between two media.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interface {
@@ -100,19 +109,14 @@ impl Media {
         if leaving && self.entered().all(|m| m != material) { self.with(material) } else { self }
     }
 
-    /// The surface of a dielectric, met by a ray of a wavelength in μm (`None`: of all) that has come
-    /// through these media.
+    /// The surface of a dielectric, or of several in one place, met by a ray of a wavelength in μm (`None`: of all) that
+    /// has come through these media; of each whether the ray leaves it there.
     #[inline]
     #[must_use]
-    pub fn interface(
-        self,
-        scene: &Scene,
-        material: MaterialId,
-        leaving: bool,
-        wavelength: Option<f32>,
-    ) -> Interface {
-        let before = self.arriving(material, leaving);
-        let after = if leaving { before.without(material) } else { before.with(material) };
+    pub fn interface(self, scene: &Scene, surfaces: &[Crossed], wavelength: Option<f32>) -> Interface {
+        let before = surfaces.iter().filter(|s| s.leaving).fold(self, |m, s| m.arriving(s.material, true));
+        let after = surfaces.iter().filter(|s| s.leaving).fold(before, |m, s| m.without(s.material));
+        let after = surfaces.iter().filter(|s| !s.leaving).fold(after, |m, s| m.with(s.material));
         let hidden = before.filler(scene) == after.filler(scene);
         let [from, to] = [before.dielectric(scene), after.dielectric(scene)];
         let index = |d: Option<&Dielectric>| d.map_or(1.0, |d| d.ior.at(wavelength));

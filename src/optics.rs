@@ -4,9 +4,9 @@ mod fresnel;
 
 pub use fresnel::{fresnel, fresnel_conductor, metal_reflectance, reflect, refract, transmittance};
 
-use crate::geometry::{Hit, SurfacePoint};
-use crate::media::{Interface, Media};
-use crate::scene::{Material, Scene};
+use crate::geometry::{Hit, Ray, SurfacePoint, offset_origin};
+use crate::media::{Crossed, Interface, Media};
+use crate::scene::{Material, MaterialId, Scene};
 use crate::spectrum::Line;
 use glam::Vec3;
 
@@ -71,23 +71,44 @@ pub struct Arrival<'a> {
     pub media: Media,
     /// Its wavelength, μm; `None` is light of all wavelengths.
     pub wavelength: Option<f32>,
+    /// Another dielectric's surface in the same place, to the precision of the hits.
+    touching: Option<Crossed>,
+    /// Bound on how far each coordinate of the point is from the true surfaces.
+    error: f32,
 }
 
 impl<'a> Arrival<'a> {
     /// Corrects what the ray is known to have come through by the side on which it arrives.
     #[must_use]
-    pub fn new(
-        scene: &'a Scene,
-        hit: &'a Hit,
-        direction: Vec3,
-        known: &Media,
-        wavelength: Option<f32>,
-    ) -> Self {
-        let mut arrival = Self { scene, hit, direction, media: *known, wavelength };
+    pub fn new(scene: &'a Scene, ray: &Ray, hit: &'a Hit, known: Media, wavelength: Option<f32>) -> Self {
+        let (direction, error) = (ray.direction, hit.surface.error);
+        let mut arrival = Self { scene, hit, direction, media: known, wavelength, touching: None, error };
         if arrival.material().dielectric().is_some() {
-            arrival.media = known.arriving(scene.objects[hit.object.index()].material, arrival.leaves());
+            arrival.touch(ray);
+            arrival.media = arrival.interface(None).before;
         }
         arrival
+    }
+
+    /// Looks for the surface of another dielectric in the same place.
+    fn touch(&mut self, ray: &Ray) {
+        let (scene, surface) = (self.scene, &self.hit.surface);
+        let slant = self.direction.dot(surface.normal).abs().max(1e-3);
+        for other in &scene.touching {
+            let material = scene.objects[other.object.index()].material;
+            if other.object == self.hit.object || material == self.material_id() {
+                continue;
+            }
+            let Some(hit) = other.geometry.closest_hit(ray) else { continue };
+            let apart = (hit.t - self.hit.t).abs();
+            let rounding = surface.error + hit.surface.error;
+            if apart * slant <= 2.0 * rounding {
+                let leaving = self.direction.dot(hit.surface.normal) > 0.0;
+                self.touching = Some(Crossed { material, leaving });
+                self.error = rounding + apart;
+                return;
+            }
+        }
     }
 
     /// What the surface is made of.
@@ -97,8 +118,19 @@ impl<'a> Arrival<'a> {
         self.scene.material_of(self.hit.object)
     }
 
+    fn material_id(&self) -> MaterialId {
+        self.scene.objects[self.hit.object.index()].material
+    }
+
     fn leaves(&self) -> bool {
         self.direction.dot(self.hit.surface.normal) > 0.0
+    }
+
+    /// Where a ray in a direction sets out: off the surface, and off what touches it.
+    #[inline]
+    #[must_use]
+    pub fn origin_toward(&self, direction: Vec3) -> Vec3 {
+        offset_origin(self.hit.surface.point, self.error, self.hit.surface.normal, direction)
     }
 
     /// What the surface's S part does to the ray. `line` picks a wavelength where light of all is taken apart.
@@ -164,8 +196,15 @@ impl<'a> Arrival<'a> {
     /// The surface as one between two media, for light of a wavelength in μm.
     #[must_use]
     pub fn interface(&self, wavelength: Option<f32>) -> Interface {
-        let material = self.scene.objects[self.hit.object.index()].material;
-        self.media.interface(self.scene, material, self.leaves(), wavelength)
+        let own = Crossed { material: self.material_id(), leaving: self.leaves() };
+        match self.touching {
+            None => self.media.interface(self.scene, &[own], wavelength),
+            Some(other) => {
+                // In an order that does not depend on which of them was found first.
+                let (first, last) = if own.material < other.material { (own, other) } else { (other, own) };
+                self.media.interface(self.scene, &[first, last], wavelength)
+            }
+        }
     }
 
     fn crossing(&self, line: &impl Fn() -> Line) -> Crossing {

@@ -8,8 +8,11 @@ use crate::pass2_eye::Footprints;
 use crate::photon_map;
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
-use crate::scene::{Environment, Light, LightSampling, Material, Paths, Scene, Warning};
+use crate::scene::{Environment, Light, LightSampling, Material, ObjectId, Paths, Scene, Warning};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
+
+mod reach;
 
 /// What a render will do. A pure function of the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,6 +67,8 @@ struct Pilot {
     tally: Tally,
     /// Photons sent.
     sent: u32,
+    /// Specular objects that they have met.
+    met: BTreeSet<ObjectId>,
 }
 
 impl Plan {
@@ -160,6 +165,7 @@ impl Plan {
             );
             return;
         }
+        self.warnings.extend(reach::unreachable_specular(scene, &pilots));
         if total <= 0.0 {
             let energy = |f: fn(&Tally) -> f64| pilots.iter().map(|p| f(&p.tally)).sum::<f64>();
             let escaped = energy(|t| t.energy.escaped.max_element());
@@ -203,10 +209,6 @@ impl Plan {
     fn decide_direct(&mut self, scene: &Scene) {
         let delta = |l: &Light| l.surface_radiance().is_none();
         let lit = scene.lights.iter().filter(|l| !l.is_dark()).count();
-        let dark = scene.lights.len() - lit;
-        if dark > 0 {
-            self.warn("zero_power_light", format!("{dark} of {} lights give no light", scene.lights.len()));
-        }
         if lit == 0 && scene.environment.is_black() {
             self.decide("direct light", false, "nothing", "no light gives light");
             self.warn("no_light", "no light gives light: the picture is black");
@@ -325,13 +327,13 @@ fn pilot(scene: &Scene, mut window: Window, index: u64) -> Pilot {
         pass1_light::pilot(scene, window, Block { first: 0, count: 1 << log2, seed })
     };
     let mut log2 = PILOT_LOG2;
-    let (mut tally, mut guide, _) = run(&window, log2);
+    let (mut tally, mut guide, mut met) = run(&window, log2);
     if tally.stored == 0 {
         log2 += 4;
-        (tally, guide, _) = run(&window, log2);
+        (tally, guide, met) = run(&window, log2);
     }
     window.guide = guide;
-    Pilot { window, tally, sent: 1 << log2 }
+    Pilot { window, tally, sent: 1 << log2, met }
 }
 
 /// A window's source in words.

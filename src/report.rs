@@ -15,8 +15,11 @@ pub fn plan_json(scene: &Scene, plan: &Plan) -> Value {
         .iter()
         .map(|d| json!({ "topic": d.topic, "runs": d.runs, "choice": d.choice, "reason": d.reason }))
         .collect();
-    let warnings: Vec<Value> =
-        plan.warnings.iter().map(|w| json!({ "code": w.code, "message": w.message })).collect();
+    let warnings: Vec<Value> = plan
+        .warnings
+        .iter()
+        .map(|w| json!({ "code": w.code, "pointer": w.pointer, "message": w.message }))
+        .collect();
     let windows: Vec<Value> = plan
         .photons
         .iter()

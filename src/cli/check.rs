@@ -16,7 +16,7 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let scene = load_scene(&arguments.scene)?;
     let plan = Plan::new(&scene);
     for warning in &plan.warnings {
-        say(format!("warning: {} [{}]", warning.message, warning.code));
+        say(format!("warning: {warning}"));
     }
     let primitives = scene.geometry.primitive_count();
     say(format!(

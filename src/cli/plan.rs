@@ -28,7 +28,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         say(format!("{mark}  {:<13} {:<45} {}", decision.topic, decision.choice, decision.reason));
     }
     for warning in &plan.warnings {
-        say(format!("warning: {} [{}]", warning.message, warning.code));
+        say(format!("warning: {warning}"));
     }
     say(format!("memory: about {} MiB", plan.memory_bytes.div_ceil(1 << 20)));
     Ok(())

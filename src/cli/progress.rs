@@ -3,6 +3,7 @@
 use super::files::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use nephroid::render::{Render, RoundReport};
+use nephroid::scene::Warning;
 use serde_json::json;
 use std::io::IsTerminal;
 
@@ -54,11 +55,14 @@ impl Reporter {
         }
     }
 
-    pub(super) fn warning(&self, code: &str, message: &str) {
+    pub(super) fn warning(&self, warning: &Warning) {
         match self {
             Self::Quiet => {}
-            Self::Json => say(json!({ "event": "warning", "code": code, "message": message })),
-            Self::Bar(bar) => bar.println(format!("warning: {message} [{code}]")),
+            Self::Json => {
+                let Warning { code, pointer, message } = warning;
+                say(json!({ "event": "warning", "code": code, "pointer": pointer, "message": message }));
+            }
+            Self::Bar(bar) => bar.println(format!("warning: {warning}")),
         }
     }
 

@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let scene = Arc::new(scene);
     let plan = pool.install(|| Plan::new(&scene));
     for warning in &plan.warnings {
-        reporter.warning(warning.code, &warning.message);
+        reporter.warning(warning);
     }
     let mut render = Render::new(scene, plan);
     let ended = pool.install(|| run_rounds(&mut render, &control, &reporter));

@@ -3,7 +3,7 @@
 use super::emit::EmittedPhoton;
 use super::energy::Tally;
 use super::window::Window;
-use crate::geometry::{Hit, Ray, offset_origin};
+use crate::geometry::{Hit, Ray};
 use crate::media::Media;
 use crate::optics::{Arrival, Interaction, Outcome, resting_scale, transmittance};
 use crate::photon_map::Photon;
@@ -73,7 +73,7 @@ impl<'a> PhotonWalk<'a> {
                 }
                 tally.hit_caster += 1;
             }
-            let arrival = Arrival::new(self.scene, &hit, ray.direction, &media, wavelength);
+            let arrival = Arrival::new(self.scene, &ray, &hit, media, wavelength);
             let left = power * transmittance(arrival.media.absorption(self.scene), hit.t);
             tally.energy.absorbed += power.as_dvec3() - left.as_dvec3();
             power = left;
@@ -101,8 +101,7 @@ impl<'a> PhotonWalk<'a> {
             if !survive(&mut power, first_power, sample.get(dimension + 1), tally) {
                 return;
             }
-            let surface = &hit.surface;
-            let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
+            let origin = arrival.origin_toward(outcome.direction);
             (media, wavelength) = (outcome.media, outcome.wavelength);
             ray = ray.continue_from(origin, outcome.direction);
         }

@@ -6,7 +6,6 @@ use super::footprint::view_code;
 use super::specular::{Branch, EyeWalk, Lookups, Scattered};
 use crate::bsdf::Bsdf;
 use crate::film::PixelSums;
-use crate::geometry::offset_origin;
 use crate::light_path::PathClass;
 use crate::optics::Arrival;
 use crate::photon_map::Lookup;
@@ -140,7 +139,7 @@ impl EyeWalk<'_> {
         }
         let surface = &arrival.hit.surface;
         let direction = scattered.direction;
-        let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
+        let origin = arrival.origin_toward(direction);
         let pdf = bsdf.albedo().is_none().then_some(scattered.pdf);
         self.go_on(Branch {
             ray: branch.ray.continue_from(origin, direction),

@@ -8,7 +8,7 @@
 //! and neighbours share them, so that every photon falls on exactly one pixel: nothing is blurred, and the even
 //! spacing of low-discrepancy photons is not lost to random places of looking.
 
-use crate::geometry::{SheetId, SurfacePoint, offset_origin};
+use crate::geometry::{SheetId, SurfacePoint};
 use crate::media::Media;
 use crate::optics::Arrival;
 use crate::sampling::hash;
@@ -169,7 +169,7 @@ fn land(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
         if scene.geometry.may_meet_moving(&ray, hit.t) {
             return None;
         }
-        let arrival = Arrival::new(scene, &hit, ray.direction, &media, None);
+        let arrival = Arrival::new(scene, &ray, &hit, media, None);
         let interaction = arrival.interact(|| UNDISPERSED);
         let material = arrival.material();
         let surface = &hit.surface;
@@ -186,7 +186,7 @@ fn land(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
         }
         key = outcome.extend_key(key);
         media = outcome.media;
-        let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
+        let origin = arrival.origin_toward(outcome.direction);
         ray = ray.continue_from(origin, outcome.direction);
     }
     None

@@ -8,7 +8,7 @@
 use super::EyeContext;
 use super::direct::{environment_density, power_heuristic};
 use crate::film::PixelSums;
-use crate::geometry::{Hit, Ray, offset_origin};
+use crate::geometry::Ray;
 use crate::light_path::PathClass;
 use crate::media::Media;
 use crate::optics::{Arrival, Event, Interaction, Outcome, transmittance};
@@ -188,7 +188,7 @@ impl<'a> EyeWalk<'a> {
             self.escape(&branch, sums);
             return;
         };
-        let arrival = Arrival::new(scene, &hit, branch.ray.direction, &branch.media, branch.wavelength);
+        let arrival = Arrival::new(scene, &branch.ray, &hit, branch.media, branch.wavelength);
         branch.media = arrival.media;
         branch.throughput *= transmittance(branch.media.absorption(scene), hit.t);
         let rests = self.arrive(&branch, &arrival, sums);
@@ -196,11 +196,11 @@ impl<'a> EyeWalk<'a> {
         branch.main &= !rests;
         let pick = self.sample.branch(branch.key);
         let interaction = arrival.interact(|| spectrum::pick(pick.get(WAVELENGTH_DIMENSION)));
-        self.scatter(&branch, &hit, &interaction);
+        self.scatter(&branch, &arrival, &interaction);
     }
 
     /// Puts the ways that leave an S onto the stack.
-    fn scatter(&mut self, branch: &Branch, hit: &Hit, interaction: &Interaction) {
+    fn scatter(&mut self, branch: &Branch, arrival: &Arrival<'_>, interaction: &Interaction) {
         let (a, b) = match (interaction.reflected, interaction.refracted) {
             (None, None) => return,
             _ if branch.bounces >= MAX_BOUNCES => {
@@ -208,25 +208,32 @@ impl<'a> EyeWalk<'a> {
                 return;
             }
             (Some(only), None) | (None, Some(only)) => {
-                self.push(branch, hit, &only, 1.0, branch.main);
+                self.push(branch, arrival, &only, 1.0, branch.main);
                 return;
             }
             (Some(a), Some(b)) => (a, b),
         };
         let weight = |o: &Outcome| (branch.throughput * o.fraction).max_element();
         if branch.scattered.is_none() && weight(&a).min(weight(&b)) >= SPLIT_ABOVE {
-            self.push(branch, hit, &b, 1.0, branch.main);
-            self.push(branch, hit, &a, 1.0, false);
+            self.push(branch, arrival, &b, 1.0, branch.main);
+            self.push(branch, arrival, &a, 1.0, false);
             return;
         }
         let share = weight(&a) / (weight(&a) + weight(&b));
         let u = self.sample.branch(branch.key).get(event_dimension(FIRST_EVENT_DIMENSION, branch.bounces));
         let (outcome, probability) = if u < share { (a, share) } else { (b, 1.0 - share) };
         let main = branch.main && outcome.event == Event::Refraction;
-        self.push(branch, hit, &outcome, probability, main);
+        self.push(branch, arrival, &outcome, probability, main);
     }
 
-    fn push(&mut self, branch: &Branch, hit: &Hit, outcome: &Outcome, probability: f32, main: bool) {
+    fn push(
+        &mut self,
+        branch: &Branch,
+        arrival: &Arrival<'_>,
+        outcome: &Outcome,
+        probability: f32,
+        main: bool,
+    ) {
         let mut throughput = branch.throughput * outcome.fraction * (outcome.radiance_scale / probability);
         let strength = throughput.max_element();
         if strength < ROULETTE_BELOW {
@@ -237,15 +244,14 @@ impl<'a> EyeWalk<'a> {
             }
             throughput /= survival;
         }
-        let surface = &hit.surface;
-        let origin = offset_origin(surface.point, surface.error, surface.normal, outcome.direction);
+        let origin = arrival.origin_toward(outcome.direction);
         self.stack.push(Branch {
             ray: branch.ray.continue_from(origin, outcome.direction),
             throughput,
             media: outcome.media,
             wavelength: outcome.wavelength,
             bounces: branch.bounces + 1,
-            travelled: branch.travelled + hit.t,
+            travelled: branch.travelled + arrival.hit.t,
             key: outcome.extend_key(branch.key),
             main,
             scattered: branch.scattered.map(|s| Scattered { straight: false, ..s }),

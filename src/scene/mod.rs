@@ -87,8 +87,19 @@ pub struct Scene {
     pub image_bytes: u64,
     /// What the file asks of the renderer.
     pub render: RenderSettings,
+    /// Dielectrics that touch others, each by itself.
+    pub touching: Vec<Touching>,
     /// What is allowed, but hardly meant.
     pub warnings: Vec<Warning>,
+}
+
+/// A dielectric object by itself: where it touches another, a ray's nearest hit tells of one of them only.
+#[derive(Debug)]
+pub struct Touching {
+    /// The object.
+    pub object: ObjectId,
+    /// Its primitives alone.
+    pub geometry: Geometry,
 }
 
 /// One named thing of the scene file (or the surface of a light).

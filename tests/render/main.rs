@@ -4,6 +4,7 @@
 
 mod camera;
 mod caustics;
+mod checks;
 mod degenerate;
 mod determinism;
 mod direct_light;

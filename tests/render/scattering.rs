@@ -24,7 +24,7 @@ fn floor_of(material: Value) -> Scene {
 fn seen_from(scene: &Scene, to_viewer: Vec3) -> Bsdf {
     let ray = Ray::new(to_viewer * 2.0, -to_viewer);
     let hit = scene.geometry.closest_hit(&ray).unwrap();
-    Bsdf::new(&Arrival::new(scene, &hit, ray.direction, &Media::default(), None)).unwrap()
+    Bsdf::new(&Arrival::new(scene, &ray, &hit, Media::default(), None)).unwrap()
 }
 
 fn at_angle(degrees: f64) -> Vec3 {
@@ -103,8 +103,7 @@ fn samples_of_every_lobe_follow_their_density() {
                     cells += 1.0;
                 }
             }
-            let z =
-                ((chi2 / cells as f64).cbrt() - (1.0 - 2.0 / (9.0 * cells))) / (2.0 / (9.0 * cells)).sqrt();
+            let z = ((chi2 / cells).cbrt() - (1.0 - 2.0 / (9.0 * cells))) / (2.0 / (9.0 * cells)).sqrt();
             assert!(
                 cells > 5.0 && z < 4.8,
                 "{material} at {degrees}: chi2 {chi2} over {cells} cells, z = {z}"

@@ -26,6 +26,7 @@ impl Compiler<'_> {
         }
         let Some(light) = self.emitter(&object.shape, radiance, index) else { return };
         self.objects[id.index()].emitter = Some(LightId(self.lights.len() as u32));
+        self.light_places.push(format!("/objects/{index}/emission"));
         self.lights.push(light);
     }
 

@@ -21,6 +21,7 @@ impl Compiler<'_> {
             if light.surface_radiance().is_some() {
                 self.light_surface(&light, index);
             }
+            self.light_places.push(format!("/lights/{index}"));
             self.lights.push(light);
         }
     }

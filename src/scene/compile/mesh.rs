@@ -60,6 +60,14 @@ impl<'a> MeshLoader<'a> {
         Some(mesh)
     }
 
+    /// A mesh that has been loaded before.
+    pub(super) fn again(&self, file: &MeshFile) -> Option<Rc<MeshData>> {
+        match &file.asset {
+            Some(asset) => self.loaded.get(asset)?.as_ref().ok().cloned(),
+            None => inline_mesh(file, "", &mut Issues::default()).map(Rc::new),
+        }
+    }
+
     fn asset(&mut self, name: &str) -> Result<Rc<MeshData>, Refusal> {
         if let Some(known) = self.loaded.get(name) {
             return known.clone();

@@ -2,6 +2,7 @@
 //! needs more than one field.
 
 mod camera;
+mod checks;
 mod emission;
 mod environment;
 mod light;
@@ -11,6 +12,7 @@ mod motion;
 mod polygon;
 mod shape;
 mod texture;
+mod touching;
 
 use super::assets::AssetSource;
 use super::file::{ImageFile, ObjectFile, RenderFile, SceneFile, StopFile, read_scene_file};
@@ -27,6 +29,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use mesh::MeshLoader;
 use shape::Originals;
 use std::collections::{HashMap, HashSet};
+use std::mem::take;
 use texture::TextureLoader;
 
 impl Scene {
@@ -73,6 +76,7 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         lights: Vec::new(),
         shutter: [0.0; 2],
         warnings: Vec::new(),
+        light_places: Vec::new(),
     };
     let image = image_settings(file.image.as_ref().and_then(Option::as_ref));
     let camera = file.camera.as_ref().and_then(|camera| {
@@ -88,19 +92,23 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         return None;
     }
     let environment = environment?;
-    Some(Scene {
+    let mut scene = Scene {
         name: file.name.clone()?.unwrap_or_default(),
         image,
         camera: camera?,
-        materials: compiler.materials,
-        objects: compiler.objects,
-        geometry: compiler.geometry.build_as(render.as_ref()?.structure),
-        lights: compiler.lights,
+        materials: take(&mut compiler.materials),
+        objects: take(&mut compiler.objects),
+        geometry: take(&mut compiler.geometry).build_as(render.as_ref()?.structure),
+        lights: take(&mut compiler.lights),
         image_bytes: compiler.textures.memory_bytes() + environment.memory_bytes(),
         environment,
         render: render?,
-        warnings: compiler.warnings,
-    })
+        touching: Vec::new(),
+        warnings: Vec::new(),
+    };
+    scene.touching = compiler.touching(file.objects.as_deref().unwrap_or_default(), &scene);
+    scene.warnings = compiler.checks(file.objects.as_deref().unwrap_or_default(), &scene);
+    Some(scene)
 }
 
 /// Why an asset is refused.
@@ -122,6 +130,8 @@ struct Compiler<'f> {
     /// When the shutter opens and closes, s.
     shutter: [f64; 2],
     warnings: Vec<Warning>,
+    /// Where in the file each light is, as a JSON pointer.
+    light_places: Vec<String>,
 }
 
 impl<'f> Compiler<'f> {

@@ -25,6 +25,11 @@ pub(super) struct Originals<'f> {
 }
 
 impl<'f> Originals<'f> {
+    /// Whether there are instances of the object with this index.
+    pub(super) fn is_instanced(&self, index: usize) -> bool {
+        self.instanced.contains(&index)
+    }
+
     pub(super) fn new(objects: &'f [Option<ObjectFile>]) -> Self {
         let mut originals = Self::default();
         let objects = || objects.iter().enumerate().filter_map(|(i, o)| Some((i, o.as_ref()?)));
@@ -42,6 +47,11 @@ impl<'f> Originals<'f> {
             }
         }
         originals
+    }
+
+    /// The index of the one object of a name.
+    pub(super) fn index_of(&self, name: &str) -> Option<usize> {
+        self.by_name.get(name).copied().flatten().map(|(index, _)| index)
     }
 }
 
@@ -63,7 +73,7 @@ pub(super) fn sides(file: &BoxFile) -> [[DVec3; 4]; 6] {
 }
 
 /// The triangles of a height field. Normals are those of the smooth surface through the heights.
-fn heightfield(file: &HeightfieldFile) -> MeshData {
+pub(super) fn heightfield(file: &HeightfieldFile) -> MeshData {
     let (rows, columns) = (file.heights.len(), file.heights[0].len());
     let step = DVec3::new(file.size[0] / (columns - 1) as f64, 1.0, file.size[1] / (rows - 1) as f64);
     let corner = DVec3::from(file.center) - DVec3::new(file.size[0], 0.0, file.size[1]) * 0.5;
@@ -241,7 +251,7 @@ struct Placed<'a> {
 }
 
 /// Scaled first, then turned, then moved.
-fn transform(file: &InstanceFile) -> DAffine3 {
+pub(super) fn transform(file: &InstanceFile) -> DAffine3 {
     let turn = file.rotate.as_ref().map_or(DQuat::IDENTITY, |RotateFile { axis, angle }| {
         let half = 0.5 * angle.to_radians();
         let v = DVec3::from(*axis).normalize() * libm::sin(half);
