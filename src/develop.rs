@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn the_srgb_curve_is_the_standard_one() {
+    fn t43_the_srgb_curve_is_the_standard_one() {
         for (linear, byte) in [(0.18, 118), (0.5, 188), (1.0, 255), (0.0, 0), (-1.0, 0), (9.0, 255)] {
             assert_eq!(shown(linear, 0.0, Tone::Linear), byte, "{linear}");
         }

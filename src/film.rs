@@ -295,3 +295,24 @@ impl PixelSums {
         self.samples = word();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// F75: a number that is not finite is found in whatever class, and named.
+    #[test]
+    fn f75_what_is_not_finite_is_found_in_its_class() {
+        assert_eq!(PixelSums::default().not_finite(), None);
+        for class in PathClass::ALL {
+            for wrong in [f32::NAN, f32::INFINITY] {
+                let mut pixel = PixelSums::default();
+                pixel.halves[1].classes.add(class, Vec3::new(0.0, wrong, 0.0));
+                assert_eq!(pixel.not_finite(), Some(class));
+            }
+        }
+        let mut pixel = PixelSums::default();
+        pixel.halves[0].irradiance.z = f32::NAN;
+        assert_eq!(pixel.not_finite(), Some(PathClass::Caustic));
+    }
+}

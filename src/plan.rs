@@ -122,6 +122,11 @@ impl Plan {
     fn decide_pass_1(&mut self, scene: &Scene) {
         if scene.render.paths == Paths::Whitted {
             self.decide("pass 1", false, "no photons", "the paths asked for, LS*E|LDS*E, hold no caustic");
+            if scene.objects.iter().any(|o| scene.materials[o.material.index()].has_specular()) {
+                let message =
+                    "mirrors and glass cast plain shadows: the paths asked for leave out what they throw";
+                self.warn("caustics_left_out", message);
+            }
             return;
         }
         let specular = scene.objects.iter().any(|o| scene.materials[o.material.index()].has_specular());
