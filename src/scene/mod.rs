@@ -17,7 +17,7 @@ mod mesh_file;
 mod read;
 mod schema;
 mod shape_file;
-mod texture;
+pub(crate) mod texture;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, MemoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection};

@@ -10,6 +10,8 @@ mod environment;
 mod geometry;
 mod geometry_shapes;
 mod geometry_structures;
+mod glb;
+mod import;
 mod light_sampling;
 mod lights;
 mod materials;
