@@ -127,6 +127,14 @@ fn check(root: &Root, data: usize) -> Result<(), ImportError> {
             return Err(content(format!("bufferViews[{index}]"), "it reaches beyond the data"));
         }
     }
+    for (index, mesh) in root.meshes.iter().enumerate() {
+        let attributes = mesh.primitives.iter().flat_map(|primitive| &primitive.attributes);
+        // The crate's own check of positions follows such an index.
+        if let Some((name, _)) = attributes.into_iter().find(|(_, i)| i.value() >= root.accessors.len()) {
+            let reason = format!("the attribute {name:?} points at an accessor that does not exist");
+            return Err(content(format!("meshes[{index}]"), reason));
+        }
+    }
     for (index, camera) in root.cameras.iter().enumerate() {
         let fits = match camera.type_ {
             Checked::Valid(Type::Perspective) => camera.perspective.is_some(),

@@ -14,6 +14,9 @@ use std::collections::HashMap;
 /// Most triangles, and most vertices, that a model may have in all; as many triangles as a scene.
 const MAX_TRIANGLES: usize = 1 << 24;
 
+/// Largest coordinate that a scene may have, in metres.
+const FARTHEST: f32 = 1e9;
+
 /// How much an instance's transform may differ from its parts, relative to its largest entry.
 const SHEAR: f64 = 1e-5;
 
@@ -69,8 +72,11 @@ impl Import {
         name: &str,
     ) -> Result<String, ImportError> {
         let name = self.unique(name);
-        if let Some(index) = data.positions.iter().position(|p| !p.is_finite()) {
-            return Err(content(name, format!("the position of vertex {index} is not finite")));
+        // The comparison is false of what is not a number, too.
+        if let Some(index) = data.positions.iter().position(|p| !(p.abs().max_element() <= FARTHEST)) {
+            let reason =
+                format!("the position of vertex {index} is not a finite number below {FARTHEST:e} m");
+            return Err(content(name, reason));
         }
         for position in &data.positions {
             self.include(*position);
@@ -106,10 +112,8 @@ impl Import {
         primitive: &Primitive<'_>,
         uv_set: u32,
     ) -> Result<Option<MeshData>, ImportError> {
-        let Some(positions) = primitive.get(&Semantic::Positions) else {
-            self.warn("no_positions", "a primitive without positions is left out");
-            return Ok(None);
-        };
+        let positions = primitive.get(&Semantic::Positions);
+        let positions = positions.ok_or_else(|| content("meshes", "a primitive has no positions"))?;
         model.check_accessor(&positions, Dimensions::Vec3, &[DataType::F32])?;
         let count = positions.count();
         let same_count = |semantic: &Semantic, dimensions, types: &[DataType]| {

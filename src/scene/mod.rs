@@ -7,6 +7,7 @@ pub mod assets;
 mod camera;
 mod compile;
 mod environment;
+mod environment_file;
 mod file;
 mod issue;
 mod json;

@@ -294,7 +294,7 @@ const BAD_MODELS: &[(&str, &str, &str)] = &[
     ("/bufferViews/0/byteStride", "4", "accessors[0]"),
     ("/bufferViews/0/byteStride", "1", "byteStride"),
     ("/bufferViews/0/buffer", "7", "bufferViews[0]"),
-    ("/meshes/0/primitives/0/attributes/POSITION", "99", "POSITION"),
+    ("/meshes/0/primitives/0/attributes/POSITION", "99", "meshes[0]"),
     ("/meshes/0/primitives/0/indices", "99", "indices"),
     ("/nodes/0/children", "[0]", "child of two nodes"),
     ("/nodes/0/mesh", "5", "mesh"),
@@ -334,7 +334,7 @@ fn a_position_that_is_no_number_is_refused() {
     let mut model = of_material(grey());
     model.data[4..8].copy_from_slice(&f32::NAN.to_le_bytes());
     let error = import_glb(&model.bytes(), "parts").unwrap_err().to_string();
-    assert!(error.contains("vertex 0 is not finite"), "{error}");
+    assert!(error.contains("vertex 0 is not a finite number"), "{error}");
 }
 
 /// A tree of nodes of which each has the next twice as a child would be 2^64 nodes.

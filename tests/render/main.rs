@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a failed helper fails its test")]
 
+mod bad_assets;
 mod camera;
 mod caustics;
 mod determinism;
