@@ -91,7 +91,8 @@ fn sky(azimuth: f64, elevation: f64) -> DVec3 {
         dvec3(cos_e * sin_a, sin_e, -cos_e * cos_a)
     };
     if elevation < 0.0 {
-        return dvec3(0.16, 0.14, 0.12);
+        // Land as bright as a surface of albedo 0.5 under this sky.
+        return dvec3(0.95, 0.76, 0.55);
     }
     let toward = direction(azimuth, elevation);
     let sun = direction(-0.9, 0.55);

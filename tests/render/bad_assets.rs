@@ -159,6 +159,16 @@ fn damaged_skies_cause_no_panic() {
     damage_in(&with_sky(), &hdr(), 21);
 }
 
+/// Marks of runs of length zero, each of which multiplies the next by 256: more of them than a length has bytes.
+#[test]
+fn runs_of_no_length_in_a_sky_cause_no_panic() {
+    let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 16\n\x09\x09\x09\x80".to_vec();
+    for _ in 0..12 {
+        bytes.extend([1, 1, 1, 0]);
+    }
+    let _ = decode_hdr(&bytes, 1 << 20);
+}
+
 #[test]
 fn damaged_models_cause_no_panic_and_what_is_read_of_them_can_be_compiled_or_is_refused() {
     damage(&model(), 30, |bytes| {

@@ -349,6 +349,40 @@ fn nodes_that_multiply_are_refused() {
     assert!(matches!(import_glb(&model.bytes(), "parts"), Err(ImportError::Content { .. })));
 }
 
+/// What `nephroid` says with these arguments in a folder.
+fn command(folder: &std::path::Path, arguments: &[&str]) -> (Option<i32>, String) {
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_nephroid"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let text = [output.stdout, output.stderr].concat();
+    (output.status.code(), String::from_utf8_lossy(&text).into_owned())
+}
+
+#[test]
+fn a_converted_model_renders_to_the_bytes_of_the_model_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut model = Glb::new();
+    let texture = model.picture(&png(2, 2, &[255, 0, 0, 0, 255, 0, 0, 0, 255, 9, 9, 9]));
+    let material = model.material(
+        json!({ "name": "Käse/Brot", "pbrMetallicRoughness": { "metallicFactor": 0, "baseColorTexture": { "index": texture } } }),
+    );
+    let mesh = model.square(material);
+    model.node(json!({ "mesh": mesh, "name": "../square" }));
+    std::fs::write(folder.path().join("model.glb"), model.bytes()).unwrap();
+    let (code, said) = command(folder.path(), &["convert", "model.glb", "-o", "scene.json"]);
+    assert!(code == Some(0) && said.contains("[light_added]") && said.contains("with 2 files"), "{said}");
+    for (scene, picture) in [("model.glb", "a.npy"), ("scene.json", "b.npy")] {
+        let render = ["render", scene, "-o", picture, "--size", "32x24", "--rounds", "1", "--quiet"];
+        assert_eq!(command(folder.path(), &render), (Some(0), String::new()));
+    }
+    let [a, b] = ["a.npy", "b.npy"].map(|name| std::fs::read(folder.path().join(name)).unwrap());
+    assert!(a == b && a.len() == 128 + 32 * 24 * 12, "{}", a.len());
+    let written: Vec<_> = std::fs::read_dir(folder.path().join("scene")).unwrap().collect();
+    assert_eq!(written.len(), 2, "both files lie in the scene's own folder: {written:?}");
+}
+
 #[test]
 fn every_truncation_of_a_model_is_an_error_and_no_panic() {
     let bytes = of_material(grey()).bytes();
