@@ -72,8 +72,8 @@ impl Import {
         name: &str,
     ) -> Result<String, ImportError> {
         let name = self.unique(name);
-        // The comparison is false of what is not a number, too.
-        if let Some(index) = data.positions.iter().position(|p| !(p.abs().max_element() <= FARTHEST)) {
+        let far = |p: &Vec3| !p.is_finite() || p.abs().max_element() > FARTHEST;
+        if let Some(index) = data.positions.iter().position(far) {
             let reason =
                 format!("the position of vertex {index} is not a finite number below {FARTHEST:e} m");
             return Err(content(name, reason));

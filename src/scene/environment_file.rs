@@ -46,7 +46,14 @@ impl Decode for Surroundings {
             Value::Object(members) if any_is(members, "image") => {
                 object::<ImageEnvironmentFile>().decode(node, cx).map(EnvironmentFile::Image)
             }
-            _ => object::<ConstantEnvironmentFile>().decode(node, cx).map(EnvironmentFile::Constant),
+            Value::Null
+            | Value::Bool
+            | Value::Number(_)
+            | Value::String(_)
+            | Value::Array(_)
+            | Value::Object(_) => {
+                object::<ConstantEnvironmentFile>().decode(node, cx).map(EnvironmentFile::Constant)
+            }
         }
     }
 
