@@ -27,7 +27,7 @@ fn filmic(x: f64) -> f64 {
 
 /// The nearest code of the sRGB curve, by looking for the value among those at which the code changes: exact,
 /// and several times as fast as the curve's power.
-fn to_byte(linear: f64) -> u8 {
+pub(crate) fn to_byte(linear: f64) -> u8 {
     THRESHOLDS.partition_point(|&threshold| threshold <= linear) as u8
 }
 

@@ -50,7 +50,7 @@
 //! [`light_path`] the notation · [`scene`] file and compiled scene · [`geometry`] rays and surfaces · [`optics`]
 //! mirror and glass · [`sampling`] random and low-discrepancy numbers · [`plan`] what runs and why · [`render`] the
 //! method on one screen · [`pass1_light`] `LS+D` · [`photon_map`] the kd-tree · [`radius`] how wide to look ·
-//! [`pass2_eye`] `…E` · [`film`] layers and their error · [`develop`], [`image_io`] pictures · [`compare`]
+//! [`pass2_eye`] `…E` · [`film`] layers and their error · [`develop`], [`image_io`] pictures · [`import`] models in glTF · [`compare`]
 //! how two differ · [`report`] plans and statistics as JSON.
 
 pub mod bsdf;
@@ -60,6 +60,7 @@ pub mod effort;
 pub mod film;
 pub mod geometry;
 pub mod image_io;
+pub mod import;
 pub mod light_path;
 pub mod media;
 pub mod optics;

@@ -1,7 +1,7 @@
 //! `nephroid check`: is the scene all right?
 
 use super::Failure;
-use super::files::{load_scene, say};
+use super::files::{Loaded, load_scene, say};
 use clap::Args;
 use nephroid::plan::Plan;
 use std::path::PathBuf;
@@ -13,9 +13,9 @@ pub(super) struct CheckArguments {
 }
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<(), Failure> {
-    let scene = load_scene(&arguments.scene)?;
+    let Loaded { scene, warnings } = load_scene(&arguments.scene)?;
     let plan = Plan::new(&scene);
-    for warning in &plan.warnings {
+    for warning in warnings.iter().chain(&plan.warnings) {
         say(format!("warning: {warning}"));
     }
     let primitives = scene.geometry.primitive_count();

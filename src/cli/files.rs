@@ -2,16 +2,34 @@
 
 use super::Failure;
 use nephroid::image_io::{self, ImageFormat, LinearImage};
-use nephroid::scene::{DirectoryAssets, ImageSettings, Scene};
+use nephroid::import::{Imported, import_glb};
+use nephroid::scene::{DirectoryAssets, ImageSettings, Scene, Warning};
 use std::path::Path;
 
-/// Reads and compiles a scene; meshes are found relative to it.
-pub(super) fn load_scene(path: &Path) -> Result<Scene, Failure> {
+/// A scene, and what the user should know of how it was read.
+pub(super) struct Loaded {
+    pub(super) scene: Scene,
+    pub(super) warnings: Vec<Warning>,
+}
+
+/// Reads and compiles a scene, or a model in binary glTF; assets are found relative to it.
+pub(super) fn load_scene(path: &Path) -> Result<Loaded, Failure> {
+    let wrong = |errors| Failure::Scene { path: path.to_owned(), errors };
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("glb")) {
+        let Imported { scene, assets, warnings } = import(path, "model")?;
+        return Ok(Loaded { scene: Scene::from_json(&scene, &assets).map_err(wrong)?, warnings });
+    }
     let bytes = std::fs::read(path).map_err(|e| cannot("read", path, &e))?;
     let text = String::from_utf8(bytes)
         .map_err(|e| Failure::Usage(format!("{}: not UTF-8 text: {e}", path.display())))?;
     let assets = DirectoryAssets::new(path.parent().unwrap_or(Path::new("")));
-    Scene::from_json(&text, &assets).map_err(|errors| Failure::Scene { path: path.to_owned(), errors })
+    Ok(Loaded { scene: Scene::from_json(&text, &assets).map_err(wrong)?, warnings: Vec::new() })
+}
+
+/// Reads a model; its files are named as in `folder`.
+pub(super) fn import(path: &Path, folder: &str) -> Result<Imported, Failure> {
+    let bytes = std::fs::read(path).map_err(|e| cannot("read", path, &e))?;
+    import_glb(&bytes, folder).map_err(|error| Failure::Model { path: path.to_owned(), error })
 }
 
 /// The picture format that a file name asks for.

@@ -2,6 +2,7 @@
 
 mod check;
 mod compare;
+mod convert;
 mod files;
 mod plan;
 mod progress;
@@ -30,6 +31,8 @@ enum Command {
     Check(check::CheckArguments),
     /// Measure how one picture differs from another.
     Compare(compare::CompareArguments),
+    /// Turn a model in binary glTF into a scene file.
+    Convert(convert::ConvertArguments),
     /// Print the JSON Schema of scene files.
     Schema(schema::SchemaArguments),
 }
@@ -41,6 +44,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Schema(arguments) => schema::run(&arguments),
     }
 }
@@ -55,6 +59,14 @@ pub(crate) enum Failure {
         path: PathBuf,
         /// Everything wrong with it.
         errors: SceneErrors,
+    },
+    /// The model is wrong.
+    #[error("{}: {error}", .path.display())]
+    Model {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: nephroid::import::ImportError,
     },
     /// A file cannot be read or written, or an argument makes no sense.
     #[error("{0}")]
@@ -73,7 +85,7 @@ pub(crate) enum Failure {
 impl Failure {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
-            Self::Scene { .. } => 1,
+            Self::Scene { .. } | Self::Model { .. } => 1,
             Self::Usage(_) => 2,
             Self::Cancelled { .. } | Self::Render(_) => 3,
         }

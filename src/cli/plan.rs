@@ -1,7 +1,7 @@
 //! `nephroid plan`: what will run, what is left out, and why.
 
 use super::Failure;
-use super::files::{load_scene, say};
+use super::files::{Loaded, load_scene, say};
 use clap::Args;
 use nephroid::plan::Plan;
 use nephroid::report;
@@ -17,7 +17,7 @@ pub(super) struct PlanArguments {
 }
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<(), Failure> {
-    let scene = load_scene(&arguments.scene)?;
+    let Loaded { scene, warnings } = load_scene(&arguments.scene)?;
     let plan = Plan::new(&scene);
     if arguments.json {
         say(format!("{:#}", report::plan_json(&scene, &plan)));
@@ -27,7 +27,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         let mark = if decision.runs { "run " } else { "omit" };
         say(format!("{mark}  {:<13} {:<45} {}", decision.topic, decision.choice, decision.reason));
     }
-    for warning in &plan.warnings {
+    for warning in warnings.iter().chain(&plan.warnings) {
         say(format!("warning: {warning}"));
     }
     say(format!("memory: about {} MiB", plan.memory_bytes.div_ceil(1 << 20)));

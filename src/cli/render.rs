@@ -1,7 +1,7 @@
 //! `nephroid render`: a scene to a picture.
 
 use super::Failure;
-use super::files::{cannot, format_of, load_scene, save, save_image};
+use super::files::{Loaded, cannot, format_of, load_scene, save, save_image};
 use super::progress::Reporter;
 use clap::Args;
 use nephroid::light_path::PathClass;
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     for path in &arguments.output {
         format_of(path)?;
     }
-    let mut scene = load_scene(&arguments.scene)?;
+    let Loaded { mut scene, warnings } = load_scene(&arguments.scene)?;
     arguments.apply(&mut scene);
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let pool = rayon::ThreadPoolBuilder::new()
@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let reporter = Reporter::new(arguments.json, arguments.quiet);
     let scene = Arc::new(scene);
     let plan = pool.install(|| Plan::new(&scene));
-    for warning in &plan.warnings {
+    for warning in warnings.iter().chain(&plan.warnings) {
         reporter.warning(warning);
     }
     let mut render = Render::new(scene, plan);

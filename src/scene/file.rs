@@ -2,8 +2,9 @@
 //!
 //! Each type here is the one declaration of its JSON: field names, types, limits, defaults.
 
+use super::environment_file::{EnvironmentFile, Surroundings};
 use super::issue::{IssueCode, Issues};
-use super::json::{Member, Node, Value};
+use super::json::{Node, Value};
 use super::light_file::LightFile;
 use super::material_file::MaterialFile;
 use super::read::{
@@ -150,36 +151,6 @@ record! {
     }
 }
 
-/// What surrounds the scene.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum EnvironmentFile {
-    /// The same from everywhere.
-    Constant(ConstantEnvironmentFile),
-    /// A picture.
-    Image(ImageEnvironmentFile),
-}
-
-record! {
-    /// A picture of all directions: rows are latitudes, +y above; the middle column lies at -z, and to the right of it
-    /// is +x.
-    ImageEnvironmentFile {
-        /// A Radiance (.hdr) or OpenEXR (.exr) file whose values are radiance in W·sr⁻¹·m⁻².
-        image: String = required(name()),
-        /// Factor on the picture's radiance.
-        scale: f64 = or(real("factor on the radiance").between(0.0, MAX_LENGTH), 1.0),
-        /// By how much the picture is turned about the y axis, anticlockwise seen from above.
-        rotate: f64 = or(real("angle in degrees").between(-3600.0, 3600.0).unit("°"), 0.0),
-    }
-}
-
-record! {
-    /// The same light from everywhere.
-    ConstantEnvironmentFile {
-        /// Radiance.
-        radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
-    }
-}
-
 record! {
     /// What is asked of the renderer.
     RenderFile {
@@ -251,29 +222,5 @@ impl Decode for Version {
 
     fn schema(&self, _definitions: &mut Definitions) -> serde_json::Value {
         json!({ "const": VERSION as u32 })
-    }
-}
-
-pub(super) fn has(members: &[Member<'_>], name: &str) -> bool {
-    members.iter().any(|member| member.key == name)
-}
-
-struct Surroundings;
-
-impl Decode for Surroundings {
-    type Out = EnvironmentFile;
-
-    fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<EnvironmentFile> {
-        match &node.value {
-            Value::Object(members) if has(members, "image") => {
-                object::<ImageEnvironmentFile>().decode(node, cx).map(EnvironmentFile::Image)
-            }
-            _ => object::<ConstantEnvironmentFile>().decode(node, cx).map(EnvironmentFile::Constant),
-        }
-    }
-
-    fn schema(&self, definitions: &mut Definitions) -> serde_json::Value {
-        let constant = object::<ConstantEnvironmentFile>().schema(definitions);
-        json!({ "anyOf": [constant, object::<ImageEnvironmentFile>().schema(definitions)] })
     }
 }

@@ -1,12 +1,11 @@
 //! The materials of the scene file: exactly what the JSON says, nothing computed.
 
 use super::Highlight;
-use super::file::has;
 use super::issue::IssueCode;
 use super::json::{Node, Value};
 use super::read::{
-    Context, Decode, MAX_LENGTH, MIN_LENGTH, Scale, choice, color, count, name, object, optional, or, pair,
-    real, record, reference, required, tagged,
+    Context, Decode, MAX_LENGTH, MIN_LENGTH, Scale, any_is, choice, color, count, name, object, optional, or,
+    pair, real, record, reference, required, tagged,
 };
 use super::schema::Definitions;
 use serde_json::json;
@@ -174,10 +173,10 @@ impl Decode for Albedo {
 
     fn decode(&self, node: &Node<'_>, cx: &mut Context<'_>) -> Option<AlbedoFile> {
         match &node.value {
-            Value::Object(members) if has(members, "image") => {
+            Value::Object(members) if any_is(members, "image") => {
                 object::<ImageTextureFile>().decode(node, cx).map(AlbedoFile::Image)
             }
-            Value::Object(members) if has(members, "checker") => {
+            Value::Object(members) if any_is(members, "checker") => {
                 object::<PatternFile>().decode(node, cx).map(|p| AlbedoFile::Checker(p.checker))
             }
             Value::Object(_) => {

@@ -8,6 +8,7 @@ mod camera;
 mod check;
 mod compile;
 mod environment;
+mod environment_file;
 mod file;
 mod issue;
 mod json;
@@ -19,7 +20,7 @@ mod mesh_file;
 mod read;
 mod schema;
 mod shape_file;
-mod texture;
+pub(crate) mod texture;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, MemoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection};

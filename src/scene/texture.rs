@@ -46,7 +46,7 @@ pub struct TextureImage {
 
 /// Why a file is not a texture.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
-pub(super) enum TextureError {
+pub(crate) enum TextureError {
     /// Neither of the formats.
     #[error("it is neither a PNG nor a JPEG file")]
     UnknownFormat,
@@ -94,27 +94,11 @@ impl Texture {
 }
 
 impl TextureImage {
-    /// Decodes a PNG or JPEG file of at most `most_pixels` pixels; transparency is left out.
+    /// Reads a PNG or JPEG file of at most `most_pixels` pixels.
     pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Self, TextureError> {
-        let format = image::guess_format(bytes).ok();
-        let format = format.filter(|format| matches!(format, ImageFormat::Png | ImageFormat::Jpeg));
-        let format = format.ok_or(TextureError::UnknownFormat)?;
-        let reader = || ImageReader::with_format(Cursor::new(bytes), format);
-        let damaged = |error: image::ImageError| TextureError::Damaged(error.to_string());
-        // The header alone, before memory is taken for what it claims.
-        let (width, height) = reader().into_dimensions().map_err(damaged)?;
-        let pixels = u64::from(width) * u64::from(height);
-        if width.max(height) > MAX_SIDE || pixels > most_pixels {
-            return Err(TextureError::TooLarge { width, height, left: most_pixels });
-        }
-        let mut limits = Limits::default();
-        // A row and what a compressed row takes come on top of a tiny picture.
-        limits.max_alloc = Some((1 << 20) + DECODER_BYTES * pixels);
-        let mut reader = reader();
-        reader.limits(limits);
-        let decoded = reader.decode().map_err(damaged)?.into_rgb8();
+        let decoded = decode_rgb8(bytes, most_pixels)?;
         let texels: Vec<[u8; 3]> = decoded.pixels().map(|pixel| pixel.0).collect();
-        Ok(Self::new(width, height, texels))
+        Ok(Self::new(decoded.width(), decoded.height(), texels))
     }
 
     fn new(width: u32, height: u32, texels: Vec<[u8; 3]>) -> Self {
@@ -154,6 +138,27 @@ impl TextureImage {
     pub(super) fn memory_bytes(&self) -> u64 {
         size_of_val(&self.texels[..]) as u64
     }
+}
+
+/// Decodes a PNG or JPEG file of at most `most_pixels` pixels; transparency is left out.
+pub(crate) fn decode_rgb8(bytes: &[u8], most_pixels: u64) -> Result<image::RgbImage, TextureError> {
+    let format = image::guess_format(bytes).ok();
+    let format = format.filter(|format| matches!(format, ImageFormat::Png | ImageFormat::Jpeg));
+    let format = format.ok_or(TextureError::UnknownFormat)?;
+    let reader = || ImageReader::with_format(Cursor::new(bytes), format);
+    let damaged = |error: image::ImageError| TextureError::Damaged(error.to_string());
+    // The header alone, before memory is taken for what it claims.
+    let (width, height) = reader().into_dimensions().map_err(damaged)?;
+    let pixels = u64::from(width) * u64::from(height);
+    if width.max(height) > MAX_SIDE || pixels > most_pixels {
+        return Err(TextureError::TooLarge { width, height, left: most_pixels });
+    }
+    let mut limits = Limits::default();
+    // A row and what a compressed row takes come on top of a tiny picture.
+    limits.max_alloc = Some((1 << 20) + DECODER_BYTES * pixels);
+    let mut reader = reader();
+    reader.limits(limits);
+    Ok(reader.decode().map_err(damaged)?.into_rgb8())
 }
 
 impl fmt::Debug for TextureImage {

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a failed helper fails its test")]
 
+mod bad_assets;
 mod camera;
 mod caustics;
 mod checks;
@@ -13,6 +14,8 @@ mod environment;
 mod geometry;
 mod geometry_shapes;
 mod geometry_structures;
+mod glb;
+mod import;
 mod invariance;
 mod light_sampling;
 mod lights;

@@ -1,6 +1,6 @@
 //! The environment of the scene file: a constant, or a Radiance or OpenEXR picture of all directions.
 
-use super::super::file::{EnvironmentFile, ImageEnvironmentFile};
+use super::super::environment_file::{EnvironmentFile, ImageEnvironmentFile};
 use super::super::issue::IssueCode;
 use super::super::read::quoted;
 use super::super::{Environment, EnvironmentImage};

@@ -206,6 +206,11 @@ pub(super) fn note_duplicates(node: &Node<'_>, cx: &mut Context<'_>) {
     }
 }
 
+/// Whether an object has a field of this name.
+pub(super) fn any_is(members: &[Member<'_>], name: &str) -> bool {
+    members.iter().any(|member| member.key == name)
+}
+
 /// The start of a user's string, for a message.
 pub(super) fn quoted(text: &str) -> String {
     match text.char_indices().nth(MAX_QUOTED) {
