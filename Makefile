@@ -1,4 +1,4 @@
-.PHONY: serve test browser
+.PHONY: serve test browser gallery
 
 # Builds and starts the service on http://127.0.0.1:8080; settings as flags, e.g. `make serve ARGS="--threads 4"`.
 serve:
@@ -13,3 +13,7 @@ browser:
 		if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; \
 		then apt-get update && apt-get install -y chromium chromium-driver; \
 		else echo "make test: chromium and chromedriver are missing (Debian: apt-get install chromium chromium-driver)" >&2; exit 1; fi; }
+
+# Every sample scene as a picture, and the page docs/gallery/README.md.
+gallery:
+	cargo run --release --example gallery -- $(SCENES)
