@@ -127,6 +127,12 @@ impl Leaves {
         Word(PACKET | packet as u32)
     }
 
+    /// Gives back memory that no more primitives will need.
+    pub(super) fn shrink(&mut self) {
+        self.packets.shrink_to_fit();
+        self.entries.shrink_to_fit();
+    }
+
     /// Adds all primitives in their order, triangles first.
     pub(super) fn add_all(&mut self, primitives: &Primitives) -> Vec<Word> {
         let all = 0..primitives.sources.len() as u32;

@@ -125,19 +125,13 @@ fn trace_pixel(
             let raster = Vec2::new(x as f32, y as f32) + sample.get_2d(0);
             let lookups = if i < gathering { lookups } else { Lookups::Nowhere };
             let view = footprint.map(|f| f.view);
-            if !context.plan.moves {
+            if context.plan.moves {
+                let photons = context.photons.filter(|_| lookups != Lookups::Nowhere);
+                walk.start(half as usize, sample, lookups, view);
+                walk.trace_moving(raster, photons.map(|p| p.times[half as usize]), &mut sums);
+            } else {
                 walk.start(half as usize, sample, lookups, view);
                 walk.trace(raster, &mut sums);
-                continue;
-            }
-            // Every sample sees the lights at a moment of its own; photons lie where things are at theirs.
-            walk.start(half as usize, sample, Lookups::Nowhere, view);
-            walk.at_time(sample.get(TIME_DIMENSION));
-            walk.trace(raster, &mut sums);
-            if let Some(photons) = context.photons.filter(|_| lookups != Lookups::Nowhere) {
-                walk.start(half as usize, sample, lookups, view);
-                walk.at_time(photons.times[half as usize]);
-                walk.trace_caustic(raster, &mut sums);
             }
         }
     }

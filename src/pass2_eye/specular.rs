@@ -31,6 +31,9 @@ const FIRST_EVENT_DIMENSION: u32 = 6;
 /// The lens is drawn from these two dimensions of the sample itself; D and S draw from its branches.
 const LENS_DIMENSION: u32 = 14;
 
+/// The time is drawn from this dimension of the sample itself.
+const TIME_DIMENSION: u32 = 12;
+
 /// What the rays of pass 2 did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EyeCounts {
@@ -141,18 +144,19 @@ impl<'a> EyeWalk<'a> {
         self.time = 0.0;
     }
 
-    /// Sets when the sample is followed.
-    pub(super) fn at_time(&mut self, time: f32) {
-        self.time = time;
-    }
-
-    /// Adds only what the photons bring along one eye ray to the classes' sums.
-    pub(super) fn trace_caustic(&mut self, raster: Vec2, sums: &mut PixelSums) {
-        let mut all = PixelSums::default();
-        self.direct = false;
-        self.trace(raster, &mut all);
+    /// [`EyeWalk::trace`] where something moves: every sample sees the lights at a moment of its own, but photons
+    /// lie where things are at theirs, `photon_time`, so that the sample is followed once more then for what they
+    /// bring.
+    pub(super) fn trace_moving(&mut self, raster: Vec2, photon_time: Option<f32>, sums: &mut PixelSums) {
+        let lookups = std::mem::replace(&mut self.lookups, Lookups::Nowhere);
+        self.time = self.sample.get(TIME_DIMENSION);
+        self.trace(raster, sums);
+        let Some(time) = photon_time else { return };
+        let mut then = PixelSums::default();
+        (self.lookups, self.time, self.direct) = (lookups, time, false);
+        self.trace(raster, &mut then);
         self.direct = true;
-        let caustic = all.halves[self.half].classes.get(PathClass::Caustic);
+        let caustic = then.halves[self.half].classes.get(PathClass::Caustic);
         sums.halves[self.half].classes.add(PathClass::Caustic, caustic);
     }
 

@@ -4,10 +4,12 @@
 //! and as deep as there are primitives.
 
 use super::super::Bounds;
-use glam::Vec3;
+use glam::Vec3A;
 
 /// Bins along each axis.
 const BINS: usize = 16;
+/// So few primitives are halved: they mostly end in one packet, and bins cost more than they have to tell.
+const HALVE_COUNT: usize = 8;
 /// From this depth on primitives are halved by their order.
 const HALVE_DEPTH: u32 = 64;
 
@@ -65,19 +67,55 @@ impl BinaryTree {
     }
 }
 
+/// A box in registers: all axes are joined at once.
+#[derive(Clone, Copy)]
+struct WideBounds {
+    min: Vec3A,
+    max: Vec3A,
+}
+
+impl WideBounds {
+    const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
+
+    #[inline]
+    fn new(bounds: &Bounds) -> Self {
+        Self { min: bounds.min.into(), max: bounds.max.into() }
+    }
+
+    #[inline]
+    fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    #[inline]
+    fn include(self, point: Vec3A) -> Self {
+        Self { min: self.min.min(point), max: self.max.max(point) }
+    }
+
+    #[inline]
+    fn center(self) -> Vec3A {
+        (self.min + self.max) * 0.5
+    }
+
+    fn narrow(self) -> Bounds {
+        Bounds::new(self.min.into(), self.max.into())
+    }
+}
+
 fn node(items: &[Item], first: u32) -> BinaryNode {
-    let bounds = items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds));
+    let all = items.iter().fold(WideBounds::EMPTY, |all, item| all.union(WideBounds::new(&item.bounds)));
+    let bounds = all.narrow();
     BinaryNode { bounds, first, count: items.len() as u32, below: 0 }
 }
 
 #[derive(Clone, Copy)]
 struct Bin {
-    bounds: Bounds,
+    bounds: WideBounds,
     count: u32,
 }
 
 impl Bin {
-    const EMPTY: Self = Self { bounds: Bounds::EMPTY, count: 0 };
+    const EMPTY: Self = Self { bounds: WideBounds::EMPTY, count: 0 };
 
     fn add(&mut self, other: Self) {
         self.bounds = self.bounds.union(other.bounds);
@@ -85,29 +123,31 @@ impl Bin {
     }
 
     fn cost(&self) -> f32 {
-        if self.count == 0 { 0.0 } else { self.bounds.half_area() * self.count as f32 }
+        if self.count == 0 { 0.0 } else { self.bounds.narrow().half_area() * self.count as f32 }
     }
 }
 
 /// Which bin of each axis a box falls into.
 struct Binning {
-    least: Vec3,
-    scale: Vec3,
+    least: Vec3A,
+    scale: Vec3A,
 }
 
 impl Binning {
     fn new(items: &[Item]) -> Self {
-        let middles = Bounds::of(items.iter().map(|item| item.bounds.center()));
+        let middle = |item: &Item| WideBounds::new(&item.bounds).center();
+        let middles = items.iter().fold(WideBounds::EMPTY, |all, item| all.include(middle(item)));
         let size = middles.max - middles.min;
         // Just less than one bin more than there are, so that the greatest falls into the last.
-        let scale = Vec3::splat(BINS as f32 * (1.0 - 2.0 * f32::EPSILON)) / size;
+        let scale = Vec3A::splat(BINS as f32 * (1.0 - 2.0 * f32::EPSILON)) / size;
         Self {
             least: middles.min,
-            scale: Vec3::select(size.cmpgt(Vec3::ZERO) & scale.is_finite_mask(), scale, Vec3::ZERO),
+            scale: Vec3A::select(size.cmpgt(Vec3A::ZERO) & scale.is_finite_mask(), scale, Vec3A::ZERO),
         }
     }
 
-    fn bins(&self, bounds: &Bounds) -> [usize; 3] {
+    #[inline]
+    fn bins(&self, bounds: WideBounds) -> [usize; 3] {
         let at = (bounds.center() - self.least) * self.scale;
         at.to_array().map(|x| (x as usize).min(BINS - 1))
     }
@@ -115,20 +155,31 @@ impl Binning {
 
 /// Reorders the items into two parts, neither empty, and returns the size of the first.
 fn split(items: &mut [Item]) -> usize {
-    if items.len() == 2 {
-        return 1;
+    if items.len() <= HALVE_COUNT {
+        return halve(items);
     }
     let binning = Binning::new(items);
     let mut bins = [[Bin::EMPTY; BINS]; 3];
     for item in items.iter() {
-        let at = binning.bins(&item.bounds);
+        let bounds = WideBounds::new(&item.bounds);
+        let at = binning.bins(bounds);
         for axis in 0..3 {
-            bins[axis][at[axis]].add(Bin { bounds: item.bounds, count: 1 });
+            bins[axis][at[axis]].add(Bin { bounds, count: 1 });
         }
     }
     let best = (0..3).filter_map(|axis| best_plane(&bins[axis]).map(|(cost, plane)| (cost, axis, plane)));
     let Some((_, axis, plane)) = best.min_by(|a, b| a.0.total_cmp(&b.0)) else { return items.len() / 2 };
-    partition(items, |item| binning.bins(&item.bounds)[axis] < plane)
+    partition(items, |item| binning.bins(WideBounds::new(&item.bounds))[axis] < plane)
+}
+
+/// Halves a few items along the longest extent of their middles.
+fn halve(items: &mut [Item]) -> usize {
+    let half = items.len() / 2;
+    let middles = Bounds::of(items.iter().map(|item| item.bounds.center()));
+    let axis = (middles.max - middles.min).max_position();
+    let key = |item: &Item| item.bounds.center()[axis];
+    items.sort_unstable_by(|a, b| key(a).total_cmp(&key(b)).then(a.number.cmp(&b.number)));
+    half
 }
 
 /// The cheapest place to cut a row of bins; `None` if all is in one bin.

@@ -29,16 +29,24 @@ impl Bvh {
         let costs = Costs::new(&binary, primitives);
         let mut collapse = Collapse { binary, costs, bounds, primitives, leaves, nodes: Vec::new() };
         bvh.root = Some(collapse.subtree(0, 0));
-        bvh.nodes = collapse.nodes;
+        bvh.nodes = std::mem::take(&mut collapse.nodes);
+        drop(collapse);
+        // Only now, since both grow in steps and are copied to their true size.
         bvh.nodes.shrink_to_fit();
+        leaves.shrink();
         bvh
     }
 }
 
 /// What is known of each node of the binary tree.
 struct Costs {
-    /// `slots[n][k]`: least cost of the part below node `n` if it takes at most `k + 1` slots of the node above.
+    /// `slots[i][k]`: least cost of the part below inner node `i` if it takes at most `k + 1` slots of the node above.
     slots: Vec<[f32; 8]>,
+    /// The number `i` of each inner node; of a node with a single primitive, whose slots all cost the same, the cost's
+    /// bits.
+    places: Vec<u32>,
+    /// Whether there is a single primitive below.
+    single: Vec<bool>,
     /// Whether what is below becomes one leaf if it gets one slot.
     leaf: Vec<bool>,
 }
@@ -73,7 +81,12 @@ impl Content {
 impl Costs {
     fn new(binary: &BinaryTree, primitives: &Primitives) -> Self {
         let count = binary.nodes.len();
-        let mut costs = Self { slots: vec![[0.0; 8]; count], leaf: vec![false; count] };
+        let mut costs = Self {
+            slots: Vec::with_capacity(count / 2),
+            places: vec![0; count],
+            single: vec![false; count],
+            leaf: vec![false; count],
+        };
         let mut contents = vec![Content::default(); count];
         for (index, node) in binary.nodes.iter().enumerate().rev() {
             contents[index] = match node.children() {
@@ -91,26 +104,36 @@ impl Costs {
     fn fill(&mut self, node: usize, children: Option<[usize; 2]>, area: f32, leaf: Option<f32>) {
         let leaf = leaf.map_or(f32::INFINITY, |cost| cost * area);
         let Some([l, r]) = children else {
-            self.slots[node] = [leaf; 8];
-            self.leaf[node] = true;
+            self.places[node] = leaf.to_bits();
+            (self.single[node], self.leaf[node]) = (true, true);
             return;
         };
-        let inner = self.best_split([l, r], 8).0 + NODE_COST * area;
+        let below = [self.of(l), self.of(r)];
+        let inner = best_split(&below, 8).0 + NODE_COST * area;
         self.leaf[node] = leaf <= inner;
         let mut least = leaf.min(inner);
-        self.slots[node][0] = least;
-        for slots in 2..=8 {
-            least = least.min(self.best_split([l, r], slots).0);
-            self.slots[node][slots - 1] = least;
+        let mut slots = [least; 8];
+        for count in 2..=8 {
+            least = least.min(best_split(&below, count).0);
+            slots[count - 1] = least;
         }
+        self.places[node] = self.slots.len() as u32;
+        self.slots.push(slots);
     }
 
-    /// Cheapest way to share `slots` (two or more) among two children: its cost, and the slots of the first.
-    fn best_split(&self, [l, r]: [usize; 2], slots: usize) -> (f32, usize) {
-        (1..slots)
-            .map(|k| (self.slots[l][k - 1] + self.slots[r][slots - k - 1], k))
-            .fold((f32::INFINITY, 1), |best, split| if split.0 < best.0 { split } else { best })
+    /// Least cost of the part below a node for each number of slots.
+    fn of(&self, node: usize) -> [f32; 8] {
+        let place = self.places[node];
+        if self.single[node] { [f32::from_bits(place); 8] } else { self.slots[place as usize] }
     }
+}
+
+/// Cheapest way to share `slots` (two or more) among two children, of which the costs are given: its cost, and the
+/// slots of the first.
+fn best_split([left, right]: &[[f32; 8]; 2], slots: usize) -> (f32, usize) {
+    (1..slots)
+        .map(|k| (left[k - 1] + right[slots - k - 1], k))
+        .fold((f32::INFINITY, 1), |best, split| if split.0 < best.0 { split } else { best })
 }
 
 struct Collapse<'a> {
@@ -143,13 +166,13 @@ impl Collapse<'_> {
 
     /// Cuts what is below two nodes into at most `slots` parts.
     fn split(&self, below: [usize; 2], slots: usize, cut: &mut Vec<usize>) {
-        let (_, first) = self.costs.best_split(below, slots);
+        let (_, first) = best_split(&below.map(|node| self.costs.of(node)), slots);
         self.cut(below[0], first, cut);
         self.cut(below[1], slots - first, cut);
     }
 
     fn cut(&self, node: usize, slots: usize, cut: &mut Vec<usize>) {
-        let cost = self.costs.slots[node];
+        let cost = self.costs.of(node);
         // More slots than help are not taken.
         let useful = (0..slots).find(|&k| cost[k] == cost[slots - 1]).map_or(slots, |k| k + 1);
         match self.binary.nodes[node].children() {
