@@ -13,7 +13,7 @@ use crate::film::{Film, PixelSums, RoundFilm};
 use crate::pass1_light::RoundPhotons;
 use crate::plan::Plan;
 use crate::render::{Control, RenderError};
-use crate::sampling::{SamplePoint, TIME_DIMENSION, hash};
+use crate::sampling::{SamplePoint, hash};
 use crate::scene::Scene;
 use glam::Vec2;
 use rayon::prelude::*;
