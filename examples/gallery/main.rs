@@ -16,7 +16,7 @@ const SCENES: &str = "scenes";
 const FOLDER: &str = "docs/gallery";
 
 /// No scene takes longer than this, s.
-const MOST_SECONDS: f64 = 60.0;
+const MOST_SECONDS: f64 = 30.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = Path::new(FOLDER);

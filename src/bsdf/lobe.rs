@@ -41,7 +41,10 @@ impl Lobe {
         let mean = |v: Vec3| v.element_sum() / 3.0;
         match self {
             Self::Lambert { albedo } => mean(*albedo),
-            Self::Highlight { k_s, .. } => mean(*k_s),
+            Self::Highlight { k_s, exponent, form: Highlight::Lecture } => {
+                mean(*k_s) * 2.0 / (exponent + 2.0)
+            }
+            Self::Highlight { k_s, form: Highlight::Conserving, .. } => mean(*k_s),
             Self::Metal { conductor, .. } => mean(metal_reflectance(1.0, conductor)),
             Self::Glass { .. } => 1.0,
         }

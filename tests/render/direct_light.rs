@@ -86,3 +86,16 @@ fn a_constant_environment_gives_pi_times_its_radiance() {
     assert!((irradiance - 2.0 * std::f64::consts::PI).abs() < 1e-5, "{irradiance}");
     assert_eq!(compile(&value).lights.len(), 0, "and no light is needed; seeds: {SEEDS}");
 }
+
+/// A lamp a millimetre above the floor, a hundred metres from the origin, where a float is good to some micrometres: it
+/// covers nearly the whole sky of the point below it, whose irradiance is π times its radiance. One part in a thousand
+/// for the light past its rim, (h / r)² = 1e-4, and the rounding of its height.
+#[test]
+fn f14_a_lamp_close_to_a_surface_far_from_the_origin_keeps_its_light() {
+    let lights = json!([{ "type": "quad", "center": [100, 1e-3, 100], "size": [0.2, 0.2], "towards": [100, 0, 100],
+                          "radiance": [1, 1, 1] }]);
+    let mut value = scene(camera_above([100.0, 0.0, 100.0], 5e-4, 1e-4), json!([floor(200.0, 0.0)]), lights);
+    value["camera"]["fov"] = json!(10);
+    let estimate = over_seeds(|seed| mean_irradiance(&render(&value, seed, 16, 8), PathClass::Direct));
+    estimate.assert_is(std::f64::consts::PI, 2e-3);
+}

@@ -88,16 +88,19 @@ pub(super) fn towards(
     if (from - light.point).dot(light.normal) <= receiver.surface.error + light.error {
         return None;
     }
-    let target = offset_origin(light.point, light.error, light.normal, light.normal);
-    let to = target - from;
+    let to = light.point - from;
     let distance2 = to.length_squared();
     let direction = to.try_normalize()?;
     let at_light = -light.normal.dot(direction);
     if at_light <= 0.0 || !receiver.faces(direction) {
         return None;
     }
+    // The shadow ray ends where it is as far before the light as rounding may put the light's surface.
+    let target = offset_origin(light.point, light.error, light.normal, light.normal);
+    let short = (target - light.point).dot(light.normal) / at_light;
     let Drawn { irradiance, pdf } = drawn(at_light, distance2);
-    Some(Incident { direction, distance: short_of(distance2.sqrt()), irradiance, pdf: Some(pdf) })
+    let distance = short_of((distance2.sqrt() - short).max(0.0));
+    Some(Incident { direction, distance, irradiance, pdf: Some(pdf) })
 }
 
 /// A direction to the sphere uniform in its solid angle.
