@@ -7,13 +7,14 @@
 //! # Light paths
 //!
 //! L is the light, D a surface a photon may rest on, S a mirror or smooth glass, E the eye. Every path of light
-//! matches `L(D|S)*E`. Three disjoint classes are computed, each by one estimator and in a layer of its own:
+//! matches `L(D|S)*E`. Four disjoint classes, each computed by one estimator and in a layer of its own:
 //!
 //! | class | paths | estimator |
 //! |---|---|---|
 //! | emitted | `LS*E` | pass 2: the eye's specular path meets a light |
 //! | direct | `LDS*E` | pass 2: shadow rays to the lights at the first D |
 //! | caustic | `LS+DS*E` | pass 1 stores photons, pass 2 estimates their density at the first D |
+//! | indirect | `L(D\|S)*DS*DS*E` | pass 2 goes on from each D, if the scene asks for it |
 //!
 //! # The way of the data
 //!
@@ -48,7 +49,7 @@
 //! # Modules, in reading order
 //!
 //! [`light_path`] the notation · [`scene`] file and compiled scene · [`geometry`] rays and surfaces · [`optics`]
-//! mirror and glass · [`sampling`] random and low-discrepancy numbers · [`plan`] what runs and why · [`render`] the
+//! mirror and glass · [`media`] what a ray is inside of · [`spectrum`] wavelengths · [`bsdf`] scattering · [`sampling`] random and low-discrepancy numbers · [`plan`] what runs and why · [`render`] the
 //! method on one screen · [`pass1_light`] `LS+D` · [`photon_map`] the kd-tree · [`radius`] how wide to look ·
 //! [`pass2_eye`] `…E` · [`film`] layers and their error · [`develop`], [`image_io`] pictures · [`import`] models in glTF · [`compare`]
 //! how two differ · [`report`] plans and statistics as JSON.

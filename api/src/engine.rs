@@ -2,7 +2,6 @@
 
 use crate::samples;
 use nephroid::image_io::{encode_exr, encode_png};
-use nephroid::light_path::PathClass;
 use nephroid::plan::Plan;
 use nephroid::render::{Render, RenderError};
 use nephroid::report;
@@ -224,7 +223,7 @@ impl RunningRender {
                 bytes: encode_exr(&image).map_err(|error| error.to_string())?,
             },
         ];
-        for class in PathClass::ALL {
+        for &class in self.render.scene().render.paths.classes() {
             let bytes = self.png(&picture.layer(class))?;
             outputs.push(Output { name: format!("layers/{}.png", class.name()), bytes });
         }

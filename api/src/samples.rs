@@ -3,9 +3,8 @@
 use include_dir::{Dir, include_dir};
 
 static SCENES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../scenes");
-/// What the scenes look like, for the web page, made by
-/// `nephroid render scenes/NAME.json --size 400x300 --error 0.01 --seconds 20 -o api/web/samples/NAME.png`.
-static PICTURES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/web/samples");
+/// What the scenes look like, for the web page: the pictures of the gallery, made by `make gallery`.
+static PICTURES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../docs/gallery");
 
 /// A sample scene.
 #[derive(Clone, Copy, Debug)]
@@ -64,7 +63,7 @@ mod tests {
         for sample in all() {
             let read = LoadedScene::read(sample.text, 60.0);
             assert!(read.is_ok(), "{}: {:?}", sample.name, read.err());
-            assert!(sample.picture().is_some(), "{} has no picture in api/web/samples", sample.name);
+            assert!(sample.picture().is_some(), "{} has no picture in docs/gallery", sample.name);
         }
     }
 

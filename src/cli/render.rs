@@ -4,7 +4,6 @@ use super::Failure;
 use super::files::{Loaded, cannot, format_of, load_scene, save, save_image};
 use super::progress::Reporter;
 use clap::Args;
-use nephroid::light_path::PathClass;
 use nephroid::plan::Plan;
 use nephroid::render::{Control, Render, RenderError};
 use nephroid::report;
@@ -122,7 +121,7 @@ impl RenderArguments {
         }
         if let Some(folder) = &self.layers {
             std::fs::create_dir_all(folder).map_err(|e| cannot("make", folder, &e))?;
-            for class in PathClass::ALL {
+            for &class in render.scene().render.paths.classes() {
                 let path = folder.join(format!("{}.exr", class.name()));
                 save_image(&path, &render.layer(class), settings)?;
             }

@@ -33,6 +33,7 @@ pub use schema::{schema, schema_markdown};
 pub use texture::{Texture, TextureImage};
 
 use crate::geometry::{Geometry, Structure};
+use crate::light_path::PathClass;
 use crate::radius::RadiusRule;
 use glam::Vec2;
 
@@ -153,6 +154,16 @@ impl Paths {
     /// Every value and its name.
     pub const NAMED: [(&str, Self); 3] =
         [("whitted", Self::Whitted), ("caustics", Self::Caustics), ("complete", Self::Complete)];
+
+    /// The classes of paths that are asked for.
+    #[must_use]
+    pub fn classes(self) -> &'static [PathClass] {
+        match self {
+            Self::Whitted => &[PathClass::Emitted, PathClass::Direct],
+            Self::Caustics => &[PathClass::Emitted, PathClass::Direct, PathClass::Caustic],
+            Self::Complete => &PathClass::ALL,
+        }
+    }
 }
 
 /// A value of `paths` that does not exist.
