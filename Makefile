@@ -1,4 +1,4 @@
-.PHONY: serve test browser gallery
+.PHONY: serve test bench browser gallery
 
 # Builds and starts the service on http://127.0.0.1:8080; settings as flags, e.g. `make serve ARGS="--threads 4"`.
 serve:
@@ -6,6 +6,10 @@ serve:
 
 test: browser
 	cargo test --workspace
+
+# Rays against other structures and builders.
+bench:
+	cargo bench --package nephroid
 
 # The tests of the web page need a browser and its driver.
 browser:

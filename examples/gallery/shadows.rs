@@ -143,7 +143,7 @@ impl Chart {
              | grid | jittered | adaptive | sobol |\n|---|---|---|---|\n\
              | ![bands](shadows-grid.png) | ![noise](shadows-jittered.png) | ![smooth](shadows-adaptive.png) | ![the default](shadows-sobol.png) |\n\n\
              A regular grid of points on the light gives every pixel the same shadow edges: bands. A random point in each of \
-             its squares turns them into noise of about the same size, which the eye forgives and more samples take away. \
+             its squares turns them into noise, which is smaller, which the eye forgives, and which more samples take away. \
              Adaptive division spends rays where the corners of a square disagree, but what is smaller than a square and \
              hides none of its corners is missed. The default takes one Owen-scrambled Sobol point per eye sample: noise that \
              falls faster than one over the root of the rays.\n\n![error and likeness](shadows.svg)\n\n\
