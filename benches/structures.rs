@@ -39,8 +39,8 @@ fn bench(criterion: &mut Criterion, name: &str) {
     for (word, structure, many) in STRUCTURES {
         let mut file: Value = serde_json::from_str(&text).expect("a sample scene is JSON");
         file["render"]["structure"] = json!(word);
-        let mut scene =
-            Scene::from_json(&file.to_string(), &DirectoryAssets::new("scenes")).expect("a sample scene is right");
+        let mut scene = Scene::from_json(&file.to_string(), &DirectoryAssets::new("scenes"))
+            .expect("a sample scene is right");
         assert_eq!(scene.render.structure, structure);
         if !many && scene.geometry.primitive_count() > 1000 {
             continue;
