@@ -6,7 +6,7 @@
 
 use crate::geometry::{Ray, offset_origin};
 use crate::scene::{Dielectric, Light, MaterialId, Scene};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// The dielectric materials that a ray is inside of: the last four it has entered. One that it has entered twice, by the
 /// surfaces of two objects that overlap, stands there twice.
@@ -162,7 +162,9 @@ impl Media {
             Light::Quad(quad) => Self::around(scene, quad.center),
             Light::Disk(disk) => Self::around(scene, disk.center),
             Light::Sphere(sphere) => Self::around(scene, sphere.center),
-            Light::Mesh(mesh) => mesh.corners().next().map_or_else(Self::default, |p| Self::around(scene, p)),
+            Light::Mesh(mesh) => {
+                mesh.sample(Vec2::splat(0.5)).map_or_else(Self::default, |at| Self::around(scene, at.point))
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Lights. Emission for pass 1 is in `pass1_light::emit`, sampling for pass 2 in `pass2_eye::direct`.
 
 use glam::{DVec3, Vec3};
+use std::f64::consts::TAU;
 
 /// A source of light. Quantities are per channel.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,14 +104,27 @@ pub struct SphereLight {
     pub radiance: Vec3,
 }
 
-/// Triangles of constant radiance; each emits to the side of its normal by the right-hand rule.
+/// A surface of constant radiance that is made of triangles, each emitting to the side of its normal by the right-hand
+/// rule, or an open cylinder that emits outwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshLight {
     /// Radiance, W·sr⁻¹·m⁻².
     pub radiance: Vec3,
-    triangles: Vec<[Vec3; 3]>,
-    /// Areas summed up to and with each triangle, m².
-    sums: Vec<f64>,
+    surface: Emitting,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Emitting {
+    Triangles {
+        triangles: Vec<[Vec3; 3]>,
+        /// Areas summed up to and with each triangle, m².
+        sums: Vec<f64>,
+    },
+    Cylinder {
+        from: DVec3,
+        to: DVec3,
+        radius: f64,
+    },
 }
 
 /// A point of a light's surface.
@@ -127,44 +141,74 @@ pub struct LightPoint {
 impl MeshLight {
     /// Triangles without area are left out.
     #[must_use]
-    pub fn new(radiance: Vec3, triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Self {
-        let mut light = Self { radiance, triangles: Vec::new(), sums: Vec::new() };
+    pub fn new(radiance: Vec3, corners: impl IntoIterator<Item = [Vec3; 3]>) -> Self {
+        let (mut triangles, mut sums) = (Vec::new(), Vec::new());
         let mut sum = 0.0;
-        for triangle in triangles {
+        for triangle in corners {
             let area = doubled_area(&triangle).length() / 2.0;
             if area > 0.0 {
                 sum += area;
-                light.triangles.push(triangle);
-                light.sums.push(sum);
+                triangles.push(triangle);
+                sums.push(sum);
             }
         }
-        light
+        Self { radiance, surface: Emitting::Triangles { triangles, sums } }
+    }
+
+    /// The side of a cylinder without its ends, between two points that differ.
+    #[must_use]
+    pub fn cylinder(radiance: Vec3, from: DVec3, to: DVec3, radius: f64) -> Self {
+        Self { radiance, surface: Emitting::Cylinder { from, to, radius } }
     }
 
     /// Area in m².
     #[must_use]
     pub fn area(&self) -> f32 {
-        self.sums.last().copied().unwrap_or(0.0) as f32
+        match &self.surface {
+            Emitting::Triangles { sums, .. } => sums.last().copied().unwrap_or(0.0) as f32,
+            Emitting::Cylinder { from, to, radius } => (TAU * radius * (*to - *from).length()) as f32,
+        }
     }
 
-    /// All corners of all triangles.
-    pub fn corners(&self) -> impl Iterator<Item = Vec3> + '_ {
-        self.triangles.iter().flatten().copied()
+    /// Points whose bounding box holds it.
+    #[must_use]
+    pub fn corners(&self) -> Vec<Vec3> {
+        match &self.surface {
+            Emitting::Triangles { triangles, .. } => triangles.iter().flatten().copied().collect(),
+            Emitting::Cylinder { from, to, radius } => [*from, *to]
+                .iter()
+                .flat_map(|end| [*end - *radius, *end + *radius])
+                .map(|p| p.as_vec3())
+                .collect(),
+        }
     }
 
     /// A point uniform over the area for `u` uniform in the unit square; `None` if there is no area.
     #[must_use]
     pub fn sample(&self, u: glam::Vec2) -> Option<LightPoint> {
-        let target = f64::from(u.x) * self.sums.last()?;
-        let index = self.sums.partition_point(|&sum| sum <= target).min(self.triangles.len() - 1);
-        let before = if index == 0 { 0.0 } else { self.sums[index - 1] };
-        let [a, b, c] = self.triangles[index];
-        // What is left of u.x within its triangle is uniform again.
-        let left = ((target - before) / (self.sums[index] - before)).clamp(0.0, 1.0);
-        let root = left.sqrt() as f32;
-        let point = a + (b - a) * (root * (1.0 - u.y)) + (c - a) * (root * u.y);
-        let error = a.abs().max(b.abs()).max(c.abs()).max_element() * (4.0 * f32::EPSILON);
-        Some(LightPoint { point, normal: doubled_area(&[a, b, c]).normalize().as_vec3(), error })
+        match &self.surface {
+            Emitting::Triangles { triangles, sums } => {
+                let target = f64::from(u.x) * sums.last()?;
+                let index = sums.partition_point(|&sum| sum <= target).min(triangles.len() - 1);
+                let before = if index == 0 { 0.0 } else { sums[index - 1] };
+                let [a, b, c] = triangles[index];
+                // What is left of u.x within its triangle is uniform again.
+                let left = ((target - before) / (sums[index] - before)).clamp(0.0, 1.0);
+                let root = left.sqrt() as f32;
+                let point = a + (b - a) * (root * (1.0 - u.y)) + (c - a) * (root * u.y);
+                let error = a.abs().max(b.abs()).max(c.abs()).max_element() * (4.0 * f32::EPSILON);
+                Some(LightPoint { point, normal: doubled_area(&[a, b, c]).normalize().as_vec3(), error })
+            }
+            Emitting::Cylinder { from, to, radius } => {
+                let along = *to - *from;
+                let (x, y) = along.normalize().any_orthonormal_pair();
+                let (sin, cos) = libm::sincos(TAU * f64::from(u.y));
+                let normal = x * cos + y * sin;
+                let point = *from + along * f64::from(u.x) + normal * *radius;
+                let error = (point.abs().max_element() + radius) as f32 * (4.0 * f32::EPSILON);
+                Some(LightPoint { point: point.as_vec3(), normal: normal.as_vec3(), error })
+            }
+        }
     }
 }
 

@@ -4,10 +4,9 @@ use super::super::file::ObjectFile;
 use super::super::issue::IssueCode;
 use super::super::shape_file::{PolygonFile, ShapeFile};
 use super::super::{DiskLight, Light, LightId, Material, MeshLight, ObjectId, SphereLight};
-use super::shape::sides;
+use super::shape::{sides, transform};
 use super::{Compiler, vec3};
-use crate::geometry::MeshData;
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 
 impl Compiler<'_> {
     /// Makes an object a light if it has an emission. Its shape has been added before.
@@ -30,40 +29,75 @@ impl Compiler<'_> {
         self.lights.push(light);
     }
 
-    /// The light of a shape; `None` where there is none of that shape, which has then been noted.
+    /// The light of a shape; `None` if the shape is wrong, which has then been noted.
     fn emitter(&mut self, shape: &ShapeFile, radiance: Vec3, index: usize) -> Option<Light> {
-        let of_mesh = |mesh: &MeshData| {
-            let corners = mesh.triangles.iter().map(|t| t.map(|v| mesh.positions[v as usize]));
-            Light::Mesh(MeshLight::new(radiance, corners))
-        };
+        match shape {
+            ShapeFile::Instance(instance) => {
+                let (of, original) = self.originals.find(&instance.of)?;
+                // Round shapes are scaled alike along all axes, or have been refused.
+                let place = Place { to_world: transform(instance), scale: instance.scale[0], index: of };
+                self.emitter_at(&original.shape, radiance, &place)
+            }
+            ShapeFile::Sphere(_)
+            | ShapeFile::Polygon(_)
+            | ShapeFile::Mesh(_)
+            | ShapeFile::Disk(_)
+            | ShapeFile::Cylinder(_)
+            | ShapeFile::Box(_)
+            | ShapeFile::Heightfield(_) => {
+                self.emitter_at(shape, radiance, &Place { to_world: DAffine3::IDENTITY, scale: 1.0, index })
+            }
+        }
+    }
+
+    fn emitter_at(&mut self, shape: &ShapeFile, radiance: Vec3, place: &Place) -> Option<Light> {
+        let point = |p: [f64; 3]| place.to_world.transform_point3(DVec3::from(p));
         Some(match shape {
             ShapeFile::Sphere(sphere) => Light::Sphere(SphereLight {
-                center: vec3(sphere.center),
-                radius: sphere.radius as f32,
+                center: point(sphere.center).as_vec3(),
+                radius: (sphere.radius * place.scale) as f32,
                 radiance,
             }),
             ShapeFile::Disk(disk) => Light::Disk(DiskLight {
-                center: vec3(disk.center),
-                radius: disk.radius as f32,
-                normal: DVec3::from(disk.normal).normalize().as_vec3(),
+                center: point(disk.center).as_vec3(),
+                radius: (disk.radius * place.scale) as f32,
+                normal: place.to_world.transform_vector3(DVec3::from(disk.normal)).normalize().as_vec3(),
                 radiance,
             }),
-            ShapeFile::Polygon(polygon) => Light::Mesh(MeshLight::new(radiance, triangles(polygon))),
+            ShapeFile::Cylinder(file) => {
+                let (from, to) = (point(file.from), point(file.to));
+                Light::Mesh(MeshLight::cylinder(radiance, from, to, file.radius * place.scale))
+            }
+            ShapeFile::Polygon(polygon) => {
+                let ring = |ring: &Vec<[f64; 3]>| ring.iter().map(|p| point(*p).to_array()).collect();
+                let vertices = ring(&polygon.vertices);
+                let holes = polygon.holes.iter().map(ring).collect();
+                Light::Mesh(MeshLight::new(radiance, triangles(&PolygonFile { vertices, holes })))
+            }
             ShapeFile::Box(file) => {
                 let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
-                let corners = sides(file).into_iter().flat_map(halves).map(|t| t.map(|p| p.as_vec3()));
+                let corners = sides(file).into_iter().flat_map(halves);
+                let corners = corners.map(|t| t.map(|p| point(p.to_array()).as_vec3()));
                 Light::Mesh(MeshLight::new(radiance, corners))
             }
             ShapeFile::Mesh(_) | ShapeFile::Heightfield(_) => {
-                of_mesh(&self.mesh_of(shape, &format!("/objects/{index}"))?)
+                let mesh = self.mesh_of(shape, &format!("/objects/{}", place.index))?;
+                let at =
+                    |v: u32| place.to_world.transform_point3(mesh.positions[v as usize].as_dvec3()).as_vec3();
+                Light::Mesh(MeshLight::new(radiance, mesh.triangles.iter().map(|t| t.map(at))))
             }
-            ShapeFile::Cylinder(_) | ShapeFile::Instance(_) => {
-                let message = "cylinders and instances cannot emit yet: use a mesh";
-                self.issues.add(format!("/objects/{index}/emission"), IssueCode::ConflictingFields, message);
-                return None;
-            }
+            // An instance of an instance has been refused.
+            ShapeFile::Instance(_) => return None,
         })
     }
+}
+
+/// Where an emitter is put.
+struct Place {
+    to_world: DAffine3,
+    scale: f64,
+    /// The index of the object whose shape it has.
+    index: usize,
 }
 
 /// A side of an outline, projected; `low` is below `high`.

@@ -25,6 +25,11 @@ pub(super) struct Originals<'f> {
 }
 
 impl<'f> Originals<'f> {
+    /// The object of a name that only one has, and its index.
+    pub(super) fn find(&self, name: &str) -> Option<(usize, &'f ObjectFile)> {
+        self.by_name.get(name).copied().flatten()
+    }
+
     /// Whether there are instances of the object with this index.
     pub(super) fn is_instanced(&self, index: usize) -> bool {
         self.instanced.contains(&index)
