@@ -18,7 +18,10 @@ const DIRECTION_DIMENSION: u32 = 8;
 const LOBE_DIMENSION: u32 = 10;
 const ROULETTE_DIMENSION: u32 = 11;
 
-/// Tells that stream, and what comes after the D, from the others of an eye sample.
+/// Tells that stream from the others of an eye sample.
+const LEAVING_DIFFUSE: u64 = 0x5eed_0d1e;
+
+/// Tells the streams of what comes after the D: the choices at S surfaces there must not hang on the direction.
 const AFTER_DIFFUSE: u64 = 0x5eed_0d1f;
 
 /// Photons are looked up over this many times the pixel's width at a D that is seen by another: what is blurred there
@@ -38,6 +41,10 @@ impl EyeWalk<'_> {
         let Some(bsdf) = Bsdf::new(arrival) else { return false };
         let scene = self.context.scene;
         let seen = branch.scattered.map_or(0, |s| s.count) + 1;
+        if seen > 1 && scene.render.paths != Paths::Complete {
+            // The paths asked for end at the first D.
+            return true;
+        }
         let sample = self.sample.branch(branch.key);
         let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf: &bsdf, time: branch.ray.time };
         if self.direct {
@@ -78,6 +85,10 @@ impl EyeWalk<'_> {
                 let other = density_toward(light, point, &at).unwrap_or(0.0);
                 let weight = power_heuristic(pdf, other);
                 classes.add(PathClass::with_light_after(count), branch.throughput * radiance * weight);
+            }
+            // Light over mirrors or glass: the photons' part, unless rays are to find it.
+            Some(Scattered { straight: false, count, .. }) if self.goes_backward() => {
+                classes.add(PathClass::with_caustic_after(count), branch.throughput * radiance);
             }
             Some(_) => {}
         }
@@ -121,10 +132,11 @@ impl EyeWalk<'_> {
     fn leave(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, seen: u32) {
         let complete = self.context.scene.render.paths == Paths::Complete;
         let highlights = bsdf.albedo().is_none() && self.context.plan.lights_can_be_met;
-        if !(complete || highlights && seen == 1) || seen >= MOST_DIFFUSE {
+        let first_of_all = seen == 1 && (highlights || self.goes_backward());
+        if !(complete || first_of_all) || seen >= MOST_DIFFUSE {
             return;
         }
-        let stream = self.sample.branch(hash(branch.key, AFTER_DIFFUSE));
+        let stream = self.sample.branch(hash(branch.key, LEAVING_DIFFUSE));
         let Some(scattered) = bsdf.sample(stream.get_2d(DIRECTION_DIMENSION), stream.get(LOBE_DIMENSION))
         else {
             return;

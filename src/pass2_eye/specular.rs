@@ -13,6 +13,7 @@ use crate::light_path::PathClass;
 use crate::media::Media;
 use crate::optics::{Arrival, Event, Interaction, Outcome, transmittance};
 use crate::sampling::{SamplePoint, WAVELENGTH_DIMENSION, event_dimension};
+use crate::scene::Caustics;
 use crate::spectrum;
 use glam::{Vec2, Vec3};
 
@@ -29,7 +30,7 @@ const MAX_BOUNCES: u32 = 64;
 const FIRST_EVENT_DIMENSION: u32 = 6;
 
 /// The lens is drawn from these two dimensions of the sample itself; D and S draw from its branches.
-const LENS_DIMENSION: u32 = 14;
+pub(super) const LENS_DIMENSION: u32 = 14;
 
 /// The time is drawn from this dimension of the sample itself.
 const TIME_DIMENSION: u32 = 12;
@@ -262,12 +263,18 @@ impl<'a> EyeWalk<'a> {
         });
     }
 
+    /// Whether rays that meet a light by chance are what computes the caustics.
+    #[inline]
+    pub(super) fn goes_backward(&self) -> bool {
+        self.context.plan.caustics == Some(Caustics::Backward)
+    }
+
     /// Puts a ray that leaves a D onto the stack.
     pub(super) fn go_on(&mut self, branch: Branch) {
         self.stack.push(branch);
     }
 
-    /// A ray that meets nothing sees the environment. After a D and an S that is the photons' part; after a D alone
+    /// A ray that meets nothing sees the environment. After a D and an S that is the photons' part, if there are any; after a D alone
     /// it is the scattered rays' only where highlights are sharp.
     fn escape(&mut self, branch: &Branch, sums: &mut PixelSums) {
         let (environment, direction) = (&self.context.scene.environment, branch.ray.direction);
@@ -278,6 +285,9 @@ impl<'a> EyeWalk<'a> {
             Some(Scattered { straight: true, pdf: Some(pdf), count, .. }) => {
                 let weight = power_heuristic(pdf, environment_density(environment, direction));
                 classes.add(PathClass::with_light_after(count), radiance * weight);
+            }
+            Some(Scattered { straight: false, count, .. }) if self.goes_backward() => {
+                classes.add(PathClass::with_caustic_after(count), radiance);
             }
             Some(_) => {}
         }

@@ -1,7 +1,6 @@
 //! A render in progress as bytes: it continues to the same picture as if it had never stopped.
 
 use super::{PassTime, Render};
-use crate::film::Film;
 use crate::pass1_light::Tally;
 use crate::pass2_eye::EyeCounts;
 use crate::plan::Plan;
@@ -80,7 +79,6 @@ impl Render {
         for tally in &mut self.windows {
             *tally = take_tally(&mut bytes)?;
         }
-        let image = self.scene.image;
         self.blocks = take_u32(&mut bytes)?;
         self.effort.photon_shift = take_u32(&mut bytes)?.min(self.plan.most_photon_shift());
         let pixels = take_u32(&mut bytes)? as usize;
@@ -88,7 +86,7 @@ impl Render {
         self.effort.samples = counts.to_vec();
         bytes = rest;
         self.error = take_u32(&mut bytes)?.checked_sub(1).map(f32::from_bits);
-        self.film = Film::from_bytes(image.width, image.height, bytes)?;
+        self.film = self.film.read(bytes)?;
         Some(())
     }
 }

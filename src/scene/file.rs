@@ -13,7 +13,7 @@ use super::read::{
 };
 use super::schema::Definitions;
 use super::shape_file::{MotionFile, ShapeFile};
-use super::{LightSampling, Paths, Tone};
+use super::{Caustics, LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
 use serde_json::json;
@@ -156,6 +156,9 @@ record! {
     RenderFile {
         /// Which light paths are computed: `whitted` is LS*E and LDS*E, `caustics` also LS+DS*E.
         paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
+        /// What computes the caustics LS+DS*E: photons, or for comparison `backward`, path tracing that meets the lights by
+        /// chance, or `forward`, photons connected to the eye, which leaves out what mirrors and glass show.
+        caustics: Caustics = or(choice(Caustics::NAMED.to_vec()), Caustics::Photons),
         /// When the render ends; at an error of 0.02 or after 60 seconds if left out.
         stop: Option<StopFile> = optional(object::<StopFile>()),
         /// Radius of the caustics' density estimate: a pixel, or shrinking from round to round.
@@ -177,6 +180,7 @@ impl Default for RenderFile {
     fn default() -> Self {
         Self {
             paths: Paths::default(),
+            caustics: Caustics::default(),
             stop: None,
             radius: RadiusRule::default(),
             structure: Structure::default(),
