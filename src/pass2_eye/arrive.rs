@@ -8,7 +8,8 @@ use crate::bsdf::Bsdf;
 use crate::film::PixelSums;
 use crate::light_path::PathClass;
 use crate::optics::Arrival;
-use crate::photon_map::Lookup;
+use crate::photon_map::{Lookup, Nearest};
+use crate::radius::{PIXEL, Reach};
 use crate::sampling::hash;
 use crate::scene::{LightPoint, Paths};
 use glam::Vec3;
@@ -116,16 +117,35 @@ impl EyeWalk<'_> {
         let Some(photons) = self.context.photons else { return Vec3::ZERO };
         let hit = arrival.hit;
         let pixel = self.context.scene.camera.pixel_width(branch.travelled + hit.t);
-        let radius = pixel * self.kernel_pixels * wider;
         let point = hit.surface.point;
-        let lookup =
-            Lookup { point, normal: bsdf.geometric, sheet: hit.sheet, radius, both_sides: bsdf.transmits() };
+        let within = |radius: f32| Lookup {
+            point,
+            normal: bsdf.geometric,
+            sheet: hit.sheet,
+            radius,
+            both_sides: bsdf.transmits(),
+        };
+        let per_irradiance = |incident: Vec3| bsdf.per_irradiance(incident);
+        let map = &photons.maps[self.half];
         self.counts.lookups += 1;
-        let radiance = photons.maps[self.half].radiance(&lookup, |incident| bsdf.per_irradiance(incident));
-        if radiance == Vec3::ZERO {
-            return radiance;
+        match self.reach {
+            Reach::Pixels(pixels) => {
+                let radius = pixel * pixels * wider;
+                let radiance = map.radiance(&within(radius), per_irradiance);
+                if radiance == Vec3::ZERO {
+                    return radiance;
+                }
+                let geometry = &self.context.scene.geometry;
+                radiance / geometry.kernel_mass(hit.sheet, point, radius, branch.ray.time)
+            }
+            Reach::Disc(radius) => map.disc_radiance(&within(radius), per_irradiance),
+            Reach::Nearest { count, most } => {
+                let nearest = Nearest { count, least: (pixel * PIXEL as f32).min(most) };
+                let found = map.nearest_radiance(&within(most), nearest, per_irradiance);
+                self.counts.short_lookups += u64::from(found.short);
+                found.radiance
+            }
         }
-        radiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius, branch.ray.time)
     }
 
     /// Goes on from a D: if all paths are asked for, or if rays are what finds the lights in its highlights.

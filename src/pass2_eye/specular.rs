@@ -12,6 +12,7 @@ use crate::geometry::Ray;
 use crate::light_path::PathClass;
 use crate::media::Media;
 use crate::optics::{Arrival, Event, Interaction, Outcome, transmittance};
+use crate::radius::Reach;
 use crate::sampling::{SamplePoint, WAVELENGTH_DIMENSION, event_dimension};
 use crate::scene::Caustics;
 use crate::spectrum;
@@ -44,6 +45,8 @@ pub struct EyeCounts {
     pub shadow_rays: u64,
     /// Look-ups in the photon map.
     pub lookups: u64,
+    /// Look-ups of the nearest photons that found fewer than they asked for.
+    pub short_lookups: u64,
     /// Branches ended by the bounce limit.
     pub cut: u64,
 }
@@ -54,6 +57,7 @@ impl EyeCounts {
         self.eye_rays += other.eye_rays;
         self.shadow_rays += other.shadow_rays;
         self.lookups += other.lookups;
+        self.short_lookups += other.short_lookups;
         self.cut += other.cut;
     }
 }
@@ -72,8 +76,8 @@ pub(super) enum Lookups {
 /// Follows eye rays; owns the stack of branches yet to follow.
 pub(super) struct EyeWalk<'a> {
     pub(super) context: &'a EyeContext<'a>,
-    /// Radius of the density estimate in pixels.
-    pub(super) kernel_pixels: f32,
+    /// How far the density estimate reaches.
+    pub(super) reach: Reach,
     stack: Vec<Branch>,
     /// The eye sample that is being followed.
     pub(super) half: usize,
@@ -122,11 +126,11 @@ pub(super) struct Scattered {
 
 impl<'a> EyeWalk<'a> {
     pub(super) fn new(context: &'a EyeContext<'a>) -> Self {
-        let kernel_pixels = context.plan.radius.pixels(context.round) as f32;
+        let reach = context.plan.radius.reach(context.round);
         let sample = SamplePoint::new(0, 0);
         Self {
             context,
-            kernel_pixels,
+            reach,
             stack: Vec::new(),
             half: 0,
             sample,

@@ -9,7 +9,7 @@ use glam::DVec3;
 use std::sync::Arc;
 
 /// First bytes of a checkpoint; the digit is the version of the layout.
-const MAGIC: &[u8; 12] = b"nephroid-cp1";
+const MAGIC: &[u8; 12] = b"nephroid-cp2";
 
 /// Why a checkpoint cannot be continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -31,8 +31,8 @@ impl Render {
             put_f64(&mut out, time.wall);
             put_f64(&mut out, time.cpu);
         }
-        let EyeCounts { eye_rays, shadow_rays, lookups, cut } = self.eye;
-        for count in [eye_rays, shadow_rays, lookups, cut, self.windows.len() as u64] {
+        let EyeCounts { eye_rays, shadow_rays, lookups, short_lookups, cut } = self.eye;
+        for count in [eye_rays, shadow_rays, lookups, short_lookups, cut, self.windows.len() as u64] {
             put_u64(&mut out, count);
         }
         for tally in &self.windows {
@@ -71,6 +71,7 @@ impl Render {
             eye_rays: take_u64(&mut bytes)?,
             shadow_rays: take_u64(&mut bytes)?,
             lookups: take_u64(&mut bytes)?,
+            short_lookups: take_u64(&mut bytes)?,
             cut: take_u64(&mut bytes)?,
         };
         if take_u64(&mut bytes)? != self.windows.len() as u64 {

@@ -7,6 +7,7 @@ use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
 use super::light_file::LightFile;
 use super::material_file::MaterialFile;
+use super::radius_file::Radius;
 use super::read::{
     Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, name, named, note_duplicates,
     object, optional, or, pair, part, point, real, record, reference, required, seed, slots, tagged,
@@ -161,8 +162,9 @@ record! {
         caustics: Caustics = or(choice(Caustics::NAMED.to_vec()), Caustics::Photons),
         /// When the render ends; at an error of 0.02 or after 60 seconds if left out.
         stop: Option<StopFile> = optional(object::<StopFile>()),
-        /// Radius of the caustics' density estimate: a pixel, or shrinking from round to round.
-        radius: RadiusRule = or(choice(RadiusRule::NAMED.to_vec()), RadiusRule::Pixel),
+        /// Reach of the caustics' density estimate: a `pixel`, smoothed after; and for comparison a radius that shrinks from
+        /// round to round (`progressive`), one that is `fixed`, or that of the `nearest` photons.
+        radius: RadiusRule = or(Radius, RadiusRule::Pixel),
         /// The structure that finds what a ray meets; all find the same.
         structure: Structure = or(choice(Structure::NAMED.to_vec()), Structure::Auto),
         /// How quad and disk lights are sampled: by one point per eye sample (`sobol`), or by the squares of a grid,

@@ -17,6 +17,7 @@ mod light_file;
 mod material;
 mod material_file;
 mod mesh_file;
+mod radius_file;
 mod read;
 mod schema;
 mod shape_file;

@@ -4,7 +4,7 @@
 use crate::support::{Estimate, T_LIMIT, camera_above, compile, floor, mean, over_seeds, render, scene};
 use nephroid::light_path::PathClass;
 use nephroid::plan::Plan;
-use nephroid::scene::{NoAssets, Scene};
+use nephroid::scene::{Caustics, NoAssets, Scene};
 use serde_json::{Value, json};
 
 /// What an estimate costs.
@@ -227,15 +227,76 @@ fn f69_forward_tracing_stays_right_with_the_eye_close_to_the_floor() {
     assert!(all > 0.0 && off < 0.05 * all, "{off} of {all}");
 }
 
-/// The estimator's name is one of three, in a scene file.
+/// F66, F67: Metropolis light transport and manifold walks are not offered: what is offered is said.
 #[test]
-fn another_estimator_is_an_error_that_names_the_three() {
+fn f66_f67_another_estimator_is_an_error_that_names_the_three() {
+    for name in ["mlt", "mnee"] {
+        let mut value = beside_a_ball();
+        value["render"]["caustics"] = json!(name);
+        let errors = Scene::from_json(&value.to_string(), &NoAssets).unwrap_err();
+        let message = &errors.issues[0].message;
+        assert_eq!(errors.issues[0].pointer, "/render/caustics");
+        assert!(["photons", "backward", "forward"].iter().all(|name| message.contains(name)), "{message}");
+        assert!(name.parse::<Caustics>().unwrap_err().to_string().contains("`backward`"));
+    }
+}
+
+fn with_radius(radius: Value) -> Value {
     let mut value = beside_a_ball();
-    value["render"]["caustics"] = json!("vcm");
-    let errors = Scene::from_json(&value.to_string(), &NoAssets).unwrap_err();
-    let message = &errors.issues[0].message;
-    assert_eq!(errors.issues[0].pointer, "/render/caustics");
-    assert!(["photons", "backward", "forward"].iter().all(|name| message.contains(name)), "{message}");
+    value["render"]["radius"] = radius;
+    value
+}
+
+/// The classic look-ups have no bias where the light is even: the mean over a caustic that is wider than their radius
+/// is that of the pixels' footprints, but for the caustic's own curvature over 2 cm.
+#[test]
+fn fixed_and_nearest_look_ups_agree_with_footprints() {
+    let cost = Cost { rounds: 4, log2_photons: 15 };
+    let mean_of = |radius| estimate("photons", &with_radius(radius), PathClass::Caustic, cost);
+    let pixel = mean_of(json!("pixel"));
+    for radius in [json!({ "fixed": 0.02 }), json!({ "nearest": 8, "most": 0.02 })] {
+        let other = mean_of(radius.clone());
+        let error = pixel.standard_error.hypot(other.standard_error);
+        assert!(T_LIMIT * error < 0.1 * pixel.mean, "{pixel:?} {other:?}");
+        let allowed = T_LIMIT * error + 0.01 * pixel.mean;
+        assert!((other.mean - pixel.mean).abs() < allowed, "{radius}: {pixel:?} {other:?}");
+    }
+}
+
+/// F47: look-ups that find fewer photons than they ask for are counted.
+#[test]
+fn f47_short_look_ups_are_counted() {
+    let short = |radius| render(&with_radius(radius), 1, 1, 10).stats().eye;
+    let all = short(json!({ "nearest": 1000, "most": 0.01 }));
+    assert!(all.short_lookups == all.lookups && all.lookups > 0, "{all:?}");
+    assert_eq!(short(json!({ "fixed": 0.01 })).short_lookups, 0);
+}
+
+#[test]
+fn a_wrong_radius_is_an_error_with_its_place() {
+    for (radius, pointer) in [
+        (json!({ "fixed": 0 }), "/render/radius/fixed"),
+        (json!({ "nearest": 1, "most": 1 }), "/render/radius/nearest"),
+        (json!({ "nearest": 50 }), "/render/radius/most"),
+        (json!("wide"), "/render/radius"),
+    ] {
+        let errors = Scene::from_json(&with_radius(radius.clone()).to_string(), &NoAssets).unwrap_err();
+        assert_eq!(errors.issues[0].pointer, pointer, "{radius}");
+    }
+}
+
+/// Paths that are asked for to end at the first D end there, also where scattered rays look for lights in highlights.
+#[test]
+fn caustics_pictures_hold_no_light_from_a_second_surface() {
+    let mut value = beside_a_ball();
+    value["materials"]["rough"] = json!({ "type": "metal", "f0": [0.9, 0.9, 0.9], "roughness": 0.4 });
+    value["objects"][0]["material"] = json!("rough");
+    let wall = json!({ "type": "polygon", "material": "floor",
+                       "vertices": [[-1.3, 0, 3], [-1.3, 0, -3], [-1.3, 2, -3], [-1.3, 2, 3]] });
+    value["objects"].as_array_mut().unwrap().push(wall);
+    let render = render(&value, 1, 2, 10);
+    assert_eq!(mean(&render.layer(PathClass::Indirect)), 0.0);
+    assert!(mean(&render.layer(PathClass::Direct)) > 0.0);
 }
 
 /// Splats are added in the order of the photons: the bytes do not depend on threads.
