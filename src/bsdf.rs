@@ -207,6 +207,13 @@ impl Bsdf {
         self.eval(incident) / incident.dot(self.shading).abs().max(LEAST_COSINE)
     }
 
+    /// The same, but nothing for light that arrives on a side from which it is not seen.
+    #[must_use]
+    pub fn per_irradiance_from(&self, incident: Vec3) -> Vec3 {
+        let seen = self.transmits || incident.dot(self.geometric) > 0.0;
+        if seen { self.per_irradiance(incident) } else { Vec3::ZERO }
+    }
+
     /// Density per solid angle with which [`Bsdf::sample`] draws a direction.
     #[must_use]
     pub fn pdf(&self, incident: Vec3) -> f32 {

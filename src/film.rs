@@ -2,7 +2,8 @@
 
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
-use glam::Vec3;
+use crate::scene::Caustics;
+use glam::{DVec3, Vec3};
 
 const CLASSES: usize = PathClass::ALL.len();
 
@@ -87,8 +88,11 @@ impl PixelSums {
     }
 
     /// Scales all that photons brought by the round's weight.
-    fn weigh_photons(&mut self, weight: f32) {
-        self.average_lookups(weight);
+    fn weigh_photons(&mut self, weight: f32, caustics: Caustics) {
+        match caustics {
+            Caustics::Photons | Caustics::Forward => self.average_lookups(weight),
+            Caustics::Backward => {}
+        }
         for half in &mut self.halves {
             half.irradiance *= weight;
         }
@@ -105,7 +109,7 @@ impl PixelSums {
         }
     }
 
-    fn means(&self, photon_weight: f32) -> PixelMeans {
+    fn means(&self, photon_weight: f32, caustics: Caustics) -> PixelMeans {
         let per_sample = 1.0 / self.samples.max(1) as f32;
         let per_photon = if photon_weight > 0.0 { 1.0 / photon_weight } else { 0.0 };
         let gain = self.gain * (0.5 * per_sample);
@@ -115,7 +119,10 @@ impl PixelSums {
             for class in PathClass::ALL {
                 means.0[class as usize] *= match class {
                     PathClass::Emitted | PathClass::Direct | PathClass::Indirect => per_sample,
-                    PathClass::Caustic => per_photon,
+                    PathClass::Caustic => match caustics {
+                        Caustics::Photons | Caustics::Forward => per_photon,
+                        Caustics::Backward => per_sample,
+                    },
                 };
             }
             means.add(PathClass::Caustic, gain * half.irradiance * per_photon);
@@ -154,6 +161,13 @@ impl RoundFilm {
             self.pixels[start..start + values.len()].copy_from_slice(values);
         }
     }
+
+    /// Adds to the caustic class of one half; row by row.
+    pub(crate) fn add_caustics(&mut self, half: usize, radiance: &[DVec3]) {
+        for (pixel, radiance) in self.pixels.iter_mut().zip(radiance) {
+            pixel.halves[half].classes.add(PathClass::Caustic, radiance.as_vec3());
+        }
+    }
 }
 
 /// The sum of finished rounds. Rounds are added in their order, one after the other, so that the same rounds
@@ -163,17 +177,19 @@ pub struct Film {
     width: u32,
     height: u32,
     rounds: u32,
+    /// What the caustic class is a sum of: photons, by their weight, or eye samples.
+    caustics: Caustics,
     /// Sum of the rounds' photon weights.
     photon_weight: f32,
     pixels: Vec<PixelSums>,
 }
 
 impl Film {
-    /// An empty film.
+    /// An empty film, for caustics by this estimator.
     #[must_use]
-    pub fn new(width: u32, height: u32) -> Self {
+    pub fn new(width: u32, height: u32, caustics: Caustics) -> Self {
         let pixels = vec![PixelSums::default(); width as usize * height as usize];
-        Self { width, height, rounds: 0, photon_weight: 0.0, pixels }
+        Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels }
     }
 
     /// Bytes a film of this size holds.
@@ -187,14 +203,20 @@ impl Film {
         self.rounds += 1;
         self.photon_weight += photon_weight;
         for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
-            pixel.weigh_photons(photon_weight);
+            pixel.weigh_photons(photon_weight, self.caustics);
             sum.add(pixel);
         }
     }
 
     /// Means of every pixel, row by row.
     pub fn means(&self) -> impl Iterator<Item = PixelMeans> + '_ {
-        self.pixels.iter().map(|pixel| pixel.means(self.photon_weight))
+        self.pixels.iter().map(|pixel| pixel.means(self.photon_weight, self.caustics))
+    }
+
+    /// The estimator of the caustics.
+    #[must_use]
+    pub fn caustics(&self) -> Caustics {
+        self.caustics
     }
 
     /// Sum of the rounds' photon weights.
@@ -250,10 +272,10 @@ impl Film {
         bytes
     }
 
-    /// The film of [`Film::to_bytes`]; `None` if the length does not fit the size.
+    /// The film of [`Film::to_bytes`] for an empty one of the same kind; `None` if the length does not fit the size.
     #[must_use]
-    pub fn from_bytes(width: u32, height: u32, bytes: &[u8]) -> Option<Self> {
-        let mut film = Self::new(width, height);
+    pub fn read(&self, bytes: &[u8]) -> Option<Self> {
+        let mut film = Self::new(self.width, self.height, self.caustics);
         let (rounds, rest) = bytes.split_first_chunk::<4>()?;
         let (photon_weight, values) = rest.split_first_chunk::<4>()?;
         if values.len() != film.pixels.len() * PixelSums::WORDS * 4 {

@@ -55,6 +55,13 @@ impl PathClass {
         if count == 1 { Self::Direct } else { Self::Indirect }
     }
 
+    /// The class of a path that comes over mirrors or glass from the light to a D which is the eye's `count`-th.
+    #[inline]
+    #[must_use]
+    pub(crate) fn with_caustic_after(count: u32) -> Self {
+        if count == 1 { Self::Caustic } else { Self::Indirect }
+    }
+
     /// The class of a path whose vertices after the light are `bounces`, in the order light travels.
     #[must_use]
     pub fn of(bounces: &[Bounce]) -> Self {

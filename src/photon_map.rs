@@ -6,6 +6,10 @@ use glam::{Mat3, Vec3};
 use kiddo::leaf_strategy::FlatVec;
 use kiddo::{Eytzinger, KdTree, SquaredEuclidean};
 
+mod classic;
+
+pub use classic::{Found, Nearest};
+
 /// Light that has come to rest on a surface, on its way along `LS+D`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
@@ -109,17 +113,27 @@ impl PhotonMap {
     /// on the same sheet, with a similar normal, arriving on the side that is seen, and near the tangent plane count.
     #[must_use]
     pub fn radiance(&self, lookup: &Lookup, per_irradiance: impl Fn(Vec3) -> Vec3) -> Vec3 {
-        let Some(tree) = &self.tree else { return Vec3::ZERO };
+        let radius2 = lookup.radius * lookup.radius;
+        let mut sum = Vec3::ZERO;
+        self.visit(lookup, lookup.radius, |distance2, photon| {
+            let power = Vec3::from_array(photon.power) * (1.0 - distance2 / radius2);
+            sum += power * per_irradiance(-decode_direction(photon.direction));
+        });
+        if sum == Vec3::ZERO { sum } else { sum * (2.0 / (std::f32::consts::PI * radius2)) }
+    }
+
+    /// Visits the photons of a look-up that are no further away than `within`, with their squared distances.
+    fn visit(&self, lookup: &Lookup, within: f32, mut photon_at: impl FnMut(f32, Stored)) {
+        let Some(tree) = &self.tree else { return };
         let radius2 = lookup.radius * lookup.radius;
         // A radius of no size (or NaN) holds no photons and has no density.
-        if !(lookup.radius > 0.0 && radius2 > 0.0 && radius2.is_finite()) {
-            return Vec3::ZERO;
+        if !(within > 0.0 && within * within > 0.0 && radius2 > 0.0 && radius2.is_finite()) {
+            return;
         }
         let center = ROTATION * lookup.point;
         let normal = ROTATION * lookup.normal;
-        let mut sum = Vec3::ZERO;
         tree.query(&center.to_array())
-            .within::<SquaredEuclidean<f32>>(radius2)
+            .within::<SquaredEuclidean<f32>>(within * within)
             .unsorted()
             .with_points()
             .visit(|hit| {
@@ -131,12 +145,10 @@ impl PhotonMap {
                 if same_sheet && near_plane && photon.is_aligned(lookup.normal) {
                     let travels = decode_direction(photon.direction);
                     if lookup.both_sides || travels.dot(lookup.normal) < 0.0 {
-                        let power = Vec3::from_array(photon.power) * (1.0 - hit.distance / radius2);
-                        sum += power * per_irradiance(-travels);
+                        photon_at(hit.distance, photon);
                     }
                 }
             });
-        sum * (2.0 / (std::f32::consts::PI * radius2))
     }
 }
 

@@ -4,6 +4,7 @@ use crate::film::{Film, PixelMeans};
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::pass2_eye::Footprints;
+use crate::scene::Caustics;
 use crate::smooth::{Smoothing, smooth};
 use glam::Vec3;
 use std::borrow::Cow;
@@ -86,8 +87,11 @@ impl<'a> Picture<'a> {
             return PixelError::default();
         }
         let half = |class| 0.5 * (means.halves[0].get(class) - means.halves[1].get(class));
-        let sampled = half(PathClass::Emitted) + half(PathClass::Direct) + half(PathClass::Indirect);
+        let mut sampled = half(PathClass::Emitted) + half(PathClass::Direct) + half(PathClass::Indirect);
         let mut photons = half(PathClass::Caustic);
+        if self.film.caustics() == Caustics::Backward {
+            sampled += std::mem::take(&mut photons);
+        }
         let smoothed = self.smoothing.as_ref().and_then(|s| s.squared_error[index]);
         if smoothed.is_some() {
             photons -= means.gain * 0.5 * (means.irradiance[0] - means.irradiance[1]);

@@ -8,17 +8,20 @@ use crate::pass2_eye::Footprints;
 use crate::photon_map;
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
-use crate::scene::{Environment, Light, LightSampling, Material, ObjectId, Paths, Scene, Warning};
+use crate::scene::{Caustics, Environment, Light, LightSampling, Material, ObjectId, Paths, Scene, Warning};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 mod reach;
+mod rivals;
 
 /// What a render will do. A pure function of the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Photon windows and their budgets; empty if pass 1 does not run.
     pub photons: Vec<Budget>,
+    /// The estimator that computes the caustics, if there can be any.
+    pub caustics: Option<Caustics>,
     /// Radius of the density estimate.
     pub radius: RadiusRule,
     /// What the eye is inside of.
@@ -77,6 +80,7 @@ impl Plan {
     pub fn new(scene: &Scene) -> Self {
         let mut plan = Self {
             photons: Vec::new(),
+            caustics: None,
             radius: scene.render.radius,
             eye_media: Media::around(scene, scene.camera.eye),
             lights_can_be_met: !scene.environment.is_black()
@@ -147,6 +151,10 @@ impl Plan {
             );
             return;
         }
+        if scene.render.caustics == Caustics::Backward {
+            self.decide_backward(scene);
+            return;
+        }
         let windows = pass1_light::windows(scene);
         if windows.is_empty() {
             self.decide("pass 1", false, "no photons", "no light gives light");
@@ -200,6 +208,7 @@ impl Plan {
             let log2_block = (f64::from(per_round) + share.log2()).ceil().max(f64::from(LEAST_LOG2)) as u32;
             self.photons.push(Budget { window: pilot.window, log2_block });
         }
+        self.decide_gathering(scene);
         let sent: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
         let kept = self.photons.len();
         let guided = self.photons.iter().filter(|b| b.window.guide.is_some()).count();

@@ -1,7 +1,7 @@
-//! The radius of the density estimate, in multiples of the pixel's width at the receiver.
+//! How far the density estimate reaches for photons.
 
-/// How the radius depends on the round.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+/// How the reach depends on the round.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum RadiusRule {
     /// Photons are counted on each pixel's own footprint and smoothed as wide as their halves advise; where a
     /// pixel has no footprint, a kernel of about a pixel, the same in every round.
@@ -11,27 +11,69 @@ pub enum RadiusRule {
     /// and blur both vanish in the limit (Knaus and Zwicker 2011, α = 2/3); nothing is smoothed: the classic
     /// progressive photon map, for comparison.
     Progressive,
+    /// All photons within a distance count alike (the photon map with a fixed search radius), for comparison.
+    Fixed {
+        /// The distance, m.
+        radius: f32,
+    },
+    /// So many of the nearest photons count (Jensen 1996), for comparison.
+    Nearest {
+        /// Their number, at least 2.
+        count: u32,
+        /// None further away than this, m.
+        most: f32,
+    },
 }
 
-/// Radius of [`RadiusRule::Pixel`].
-const PIXEL: f64 = 0.7;
+/// How far the look-ups of one round reach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reach {
+    /// A kernel of this many pixels' widths.
+    Pixels(f32),
+    /// A disc of this radius, m.
+    Disc(f32),
+    /// So many of the nearest photons, at least 2.
+    Nearest {
+        /// Their number.
+        count: usize,
+        /// None further away than this, m.
+        most: f32,
+    },
+}
+
+/// Radius of [`RadiusRule::Pixel`]; also the least of [`RadiusRule::Nearest`].
+pub(crate) const PIXEL: f64 = 0.7;
 
 /// First radius of [`RadiusRule::Progressive`]; the literature starts at several pixels.
 const PROGRESSIVE_START: f64 = 4.0;
+
+/// Its last: a blur of less than a pixel is not seen, and costs noise.
+const PROGRESSIVE_LEAST: f64 = 0.5;
 
 /// The share of new photons that is kept when the radius shrinks.
 const ALPHA: f64 = 2.0 / 3.0;
 
 impl RadiusRule {
-    /// Every value and its name.
+    /// The values that have no numbers, and their names.
     pub const NAMED: [(&str, Self); 2] = [("pixel", Self::Pixel), ("progressive", Self::Progressive)];
 
-    /// Radius in pixels in a round, counted from 0.
+    /// Radius in pixels in a round, counted from 0, where it is measured in pixels.
     #[must_use]
-    pub fn pixels(self, round: u32) -> f64 {
+    pub fn pixels(self, round: u32) -> Option<f64> {
         match self {
-            Self::Pixel => PIXEL,
-            Self::Progressive => PROGRESSIVE_START * progressive_shrink(round),
+            Self::Pixel => Some(PIXEL),
+            Self::Progressive => Some((PROGRESSIVE_START * progressive_shrink(round)).max(PROGRESSIVE_LEAST)),
+            Self::Fixed { .. } | Self::Nearest { .. } => None,
+        }
+    }
+
+    /// How far the look-ups of a round reach, counted from 0.
+    #[must_use]
+    pub fn reach(self, round: u32) -> Reach {
+        match self {
+            Self::Pixel | Self::Progressive => Reach::Pixels(self.pixels(round).unwrap_or(PIXEL) as f32),
+            Self::Fixed { radius } => Reach::Disc(radius),
+            Self::Nearest { count, most } => Reach::Nearest { count: count as usize, most },
         }
     }
 }
@@ -54,5 +96,13 @@ mod tests {
             let radius = progressive_shrink(rounds);
             assert!((radius - expected).abs() < 6e-5, "{rounds}: {radius}");
         }
+    }
+
+    /// F64: however many rounds there are, the radius stays a good part of a pixel.
+    #[test]
+    fn f64_the_progressive_radius_does_not_shrink_to_nothing() {
+        let radius = |round| RadiusRule::Progressive.pixels(round).unwrap();
+        assert_eq!((radius(0), radius(100_000)), (PROGRESSIVE_START, PROGRESSIVE_LEAST));
+        assert!(radius(1000) > radius(2000));
     }
 }

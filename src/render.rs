@@ -4,13 +4,13 @@ use crate::effort::{Effort, Measured};
 use crate::film::Film;
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
-use crate::pass1_light::{self, Blocks, Tally};
+use crate::pass1_light::{Blocks, Tally};
 use crate::pass2_eye::{self, EyeContext, EyeCounts, Footprints};
 use crate::picture::{Picture, PixelError};
 use crate::plan::Plan;
 use crate::radius::RadiusRule;
 use crate::sampling::{SamplePoint, hash};
-use crate::scene::Scene;
+use crate::scene::{Caustics, Scene};
 use crate::smooth::Smoothing;
 use cpu_time::ProcessTime;
 use std::sync::Arc;
@@ -18,6 +18,7 @@ use std::time::Instant;
 
 mod checkpoint;
 mod control;
+mod photons;
 
 pub use checkpoint::CheckpointError;
 pub use control::Control;
@@ -165,7 +166,7 @@ impl Render {
     pub fn new(scene: Arc<Scene>, plan: Plan) -> Self {
         let preview =
             LinearImage { width: scene.image.width, height: scene.image.height, pixels: Vec::new() };
-        let film = Film::new(scene.image.width, scene.image.height);
+        let film = Film::new(scene.image.width, scene.image.height, scene.render.caustics);
         let windows = vec![Tally::default(); plan.photons.len()];
         let time = PassTime::default();
         Self {
@@ -195,28 +196,28 @@ impl Render {
         let start = Stopwatch::start();
         let blocks = self.next_blocks();
         self.trace_footprints();
-        let photons = if self.plan.photons.is_empty() {
-            None
-        } else {
-            Some(pass1_light::emit_photons(&self.scene, &self.plan.photons, blocks, control)?)
-        };
+        let sent = self.send_photons(blocks, control)?;
         let mut pass1 = self.pass1;
         pass1.add(&start);
         let start = Stopwatch::start();
         let context = EyeContext {
             scene: &self.scene,
             plan: &self.plan,
-            photons: photons.as_ref(),
+            photons: sent.photons.as_ref(),
             round,
             footprints: &self.footprints,
             film: &self.film,
             effort: &self.effort,
         };
-        let (film, eye) = pass2_eye::trace_image(&context, control)?;
+        let (mut film, mut eye) = pass2_eye::trace_image(&context, control)?;
+        if let Some(connected) = &sent.connected {
+            connected.add_to(&mut film);
+            eye.eye_rays += connected.rays;
+        }
         self.film.add_round(film, blocks.count as f32);
         self.blocks = blocks.first + blocks.count;
         self.eye.add(&eye);
-        for (sum, tally) in self.windows.iter_mut().zip(photons.iter().flat_map(|p| &p.tallies)) {
+        for (sum, tally) in self.windows.iter_mut().zip(&sent.tallies) {
             sum.add(tally);
         }
         self.pass1 = pass1;
@@ -228,7 +229,8 @@ impl Render {
     /// Traces the pixels' footprints once, if photons are counted on them. A progressive radius is the classic
     /// method instead: photons are looked up point by point, and nothing is smoothed.
     fn trace_footprints(&mut self) {
-        let counted = !self.plan.photons.is_empty() && self.plan.radius == RadiusRule::Pixel;
+        let gathered = !self.plan.photons.is_empty() && self.plan.caustics == Some(Caustics::Photons);
+        let counted = gathered && self.plan.radius == RadiusRule::Pixel;
         if counted && self.footprints.size().0 == 0 {
             self.footprints = Footprints::trace(&self.scene, &self.plan.eye_media);
         }

@@ -60,6 +60,7 @@ pub fn stats_json(render: &Render) -> Value {
             "rays": stats.eye.eye_rays,
             "shadow_rays": stats.eye.shadow_rays,
             "photon_lookups": stats.eye.lookups,
+            "short_lookups": stats.eye.short_lookups,
             "cut": stats.eye.cut,
         },
         "kernel_radius_pixels": render.plan().radius.pixels(stats.rounds.saturating_sub(1)),

@@ -7,7 +7,7 @@ use clap::Args;
 use nephroid::plan::Plan;
 use nephroid::render::{Control, Render, RenderError};
 use nephroid::report;
-use nephroid::scene::{Paths, Scene, Stop};
+use nephroid::scene::{Caustics, Paths, Scene, Stop};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -21,6 +21,9 @@ pub(super) struct RenderArguments {
     /// Which light paths are computed: `whitted` or `caustics`.
     #[arg(long, value_name = "EXPR", value_parser = parse_paths)]
     paths: Option<Paths>,
+    /// Which estimator computes the caustics: `photons`, `backward` or `forward`.
+    #[arg(long, value_name = "NAME", value_parser = parse_caustics)]
+    caustics: Option<Caustics>,
     /// Stop at this estimated relative error (replaces the scene's own limits).
     #[arg(long, value_parser = parse_positive)]
     error: Option<f64>,
@@ -100,6 +103,9 @@ impl RenderArguments {
         if let Some(paths) = self.paths {
             scene.render.paths = paths;
         }
+        if let Some(caustics) = self.caustics {
+            scene.render.caustics = caustics;
+        }
         if let Some(seed) = self.seed {
             scene.render.seed = seed;
         }
@@ -146,6 +152,10 @@ fn peak_memory_bytes() -> Option<u64> {
 
 fn parse_paths(text: &str) -> Result<Paths, String> {
     text.parse().map_err(|e: nephroid::scene::UnknownPaths| e.to_string())
+}
+
+fn parse_caustics(text: &str) -> Result<Caustics, String> {
+    text.parse().map_err(|e: nephroid::scene::UnknownCaustics| e.to_string())
 }
 
 fn parse_positive(text: &str) -> Result<f64, String> {

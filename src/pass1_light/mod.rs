@@ -43,6 +43,17 @@ pub struct RoundPhotons {
     pub tallies: Vec<Tally>,
 }
 
+/// The same, before the trees are built.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RoundLists {
+    /// The photons of each half.
+    pub halves: [Vec<Photon>; 2],
+    /// When they have flown.
+    pub times: [f32; 2],
+    /// As in [`RoundPhotons`].
+    pub tallies: Vec<Tally>,
+}
+
 /// Which points of the windows' sequences a round takes, in blocks of the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blocks {
@@ -65,19 +76,38 @@ pub fn emit_photons(
     blocks: Blocks,
     control: &Control,
 ) -> Result<RoundPhotons, RenderError> {
-    let (halves, tallies): (Vec<_>, Vec<_>) = (0..2)
-        .map(|half| emit_half(scene, budgets, blocks, half, control))
-        .collect::<Result<Vec<_>, _>>()?
-        .into_iter()
-        .unzip();
-    let (a, b) = rayon::join(|| PhotonMap::build(&halves[0]), || PhotonMap::build(&halves[1]));
+    Ok(emit_lists(scene, budgets, blocks, control)?.into_maps())
+}
+
+/// The same, as lists in the order of the windows and their points.
+///
+/// # Errors
+/// [`RenderError::Cancelled`] if the control says so.
+pub fn emit_lists(
+    scene: &Scene,
+    budgets: &[Budget],
+    blocks: Blocks,
+    control: &Control,
+) -> Result<RoundLists, RenderError> {
+    let (a, tallies_a) = emit_half(scene, budgets, blocks, 0, control)?;
+    let (b, tallies_b) = emit_half(scene, budgets, blocks, 1, control)?;
     let mut sum = vec![Tally::default(); budgets.len()];
-    for half in &tallies {
+    for half in [&tallies_a, &tallies_b] {
         for (total, tally) in sum.iter_mut().zip(half) {
             total.add(tally);
         }
     }
-    Ok(RoundPhotons { maps: [a, b], times: blocks.times, tallies: sum })
+    Ok(RoundLists { halves: [a, b], times: blocks.times, tallies: sum })
+}
+
+impl RoundLists {
+    /// Builds the trees.
+    #[must_use]
+    pub fn into_maps(self) -> RoundPhotons {
+        let [a, b] = &self.halves;
+        let (a, b) = rayon::join(|| PhotonMap::build(a), || PhotonMap::build(b));
+        RoundPhotons { maps: [a, b], times: self.times, tallies: self.tallies }
+    }
 }
 
 fn emit_half(

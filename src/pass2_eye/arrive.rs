@@ -8,7 +8,8 @@ use crate::bsdf::Bsdf;
 use crate::film::PixelSums;
 use crate::light_path::PathClass;
 use crate::optics::Arrival;
-use crate::photon_map::Lookup;
+use crate::photon_map::{Lookup, Nearest};
+use crate::radius::{PIXEL, Reach};
 use crate::sampling::hash;
 use crate::scene::{LightPoint, Paths};
 use glam::Vec3;
@@ -18,7 +19,10 @@ const DIRECTION_DIMENSION: u32 = 8;
 const LOBE_DIMENSION: u32 = 10;
 const ROULETTE_DIMENSION: u32 = 11;
 
-/// Tells that stream, and what comes after the D, from the others of an eye sample.
+/// Tells that stream from the others of an eye sample.
+const LEAVING_DIFFUSE: u64 = 0x5eed_0d1e;
+
+/// Tells the streams of what comes after the D: the choices at S surfaces there must not hang on the direction.
 const AFTER_DIFFUSE: u64 = 0x5eed_0d1f;
 
 /// Photons are looked up over this many times the pixel's width at a D that is seen by another: what is blurred there
@@ -38,6 +42,10 @@ impl EyeWalk<'_> {
         let Some(bsdf) = Bsdf::new(arrival) else { return false };
         let scene = self.context.scene;
         let seen = branch.scattered.map_or(0, |s| s.count) + 1;
+        if seen > 1 && scene.render.paths != Paths::Complete {
+            // The paths asked for end at the first D.
+            return true;
+        }
         let sample = self.sample.branch(branch.key);
         let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf: &bsdf, time: branch.ray.time };
         if self.direct {
@@ -79,6 +87,10 @@ impl EyeWalk<'_> {
                 let weight = power_heuristic(pdf, other);
                 classes.add(PathClass::with_light_after(count), branch.throughput * radiance * weight);
             }
+            // Light over mirrors or glass: the photons' part, unless rays are to find it.
+            Some(Scattered { straight: false, count, .. }) if self.goes_backward() => {
+                classes.add(PathClass::with_caustic_after(count), branch.throughput * radiance);
+            }
             Some(_) => {}
         }
     }
@@ -105,26 +117,46 @@ impl EyeWalk<'_> {
         let Some(photons) = self.context.photons else { return Vec3::ZERO };
         let hit = arrival.hit;
         let pixel = self.context.scene.camera.pixel_width(branch.travelled + hit.t);
-        let radius = pixel * self.kernel_pixels * wider;
         let point = hit.surface.point;
-        let lookup =
-            Lookup { point, normal: bsdf.geometric, sheet: hit.sheet, radius, both_sides: bsdf.transmits() };
+        let within = |radius: f32| Lookup {
+            point,
+            normal: bsdf.geometric,
+            sheet: hit.sheet,
+            radius,
+            both_sides: bsdf.transmits(),
+        };
+        let per_irradiance = |incident: Vec3| bsdf.per_irradiance(incident);
+        let map = &photons.maps[self.half];
         self.counts.lookups += 1;
-        let radiance = photons.maps[self.half].radiance(&lookup, |incident| bsdf.per_irradiance(incident));
-        if radiance == Vec3::ZERO {
-            return radiance;
+        match self.reach {
+            Reach::Pixels(pixels) => {
+                let radius = pixel * pixels * wider;
+                let radiance = map.radiance(&within(radius), per_irradiance);
+                if radiance == Vec3::ZERO {
+                    return radiance;
+                }
+                let geometry = &self.context.scene.geometry;
+                radiance / geometry.kernel_mass(hit.sheet, point, radius, branch.ray.time)
+            }
+            Reach::Disc(radius) => map.disc_radiance(&within(radius), per_irradiance),
+            Reach::Nearest { count, most } => {
+                let nearest = Nearest { count, least: (pixel * PIXEL as f32).min(most) };
+                let found = map.nearest_radiance(&within(most), nearest, per_irradiance);
+                self.counts.short_lookups += u64::from(found.short);
+                found.radiance
+            }
         }
-        radiance / self.context.scene.geometry.kernel_mass(hit.sheet, point, radius, branch.ray.time)
     }
 
     /// Goes on from a D: if all paths are asked for, or if rays are what finds the lights in its highlights.
     fn leave(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, seen: u32) {
         let complete = self.context.scene.render.paths == Paths::Complete;
         let highlights = bsdf.albedo().is_none() && self.context.plan.lights_can_be_met;
-        if !(complete || highlights && seen == 1) || seen >= MOST_DIFFUSE {
+        let first_of_all = seen == 1 && (highlights || self.goes_backward());
+        if !(complete || first_of_all) || seen >= MOST_DIFFUSE {
             return;
         }
-        let stream = self.sample.branch(hash(branch.key, AFTER_DIFFUSE));
+        let stream = self.sample.branch(hash(branch.key, LEAVING_DIFFUSE));
         let Some(scattered) = bsdf.sample(stream.get_2d(DIRECTION_DIMENSION), stream.get(LOBE_DIMENSION))
         else {
             return;

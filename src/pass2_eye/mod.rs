@@ -3,9 +3,11 @@
 mod arrive;
 mod direct;
 mod footprint;
+mod forward;
 mod specular;
 
 pub use footprint::{Footprint, Footprints};
+pub use forward::{Connected, connect};
 pub use specular::EyeCounts;
 
 use crate::effort::Effort;
@@ -14,7 +16,7 @@ use crate::pass1_light::RoundPhotons;
 use crate::plan::Plan;
 use crate::render::{Control, RenderError};
 use crate::sampling::{SamplePoint, hash};
-use crate::scene::Scene;
+use crate::scene::{Caustics, Scene};
 use glam::Vec2;
 use rayon::prelude::*;
 use specular::{EyeWalk, Lookups};
@@ -102,9 +104,10 @@ fn trace_pixel(
     (x, y): (u32, u32),
     index: usize,
 ) -> PixelSums {
-    let footprint = context.footprints.get(index).filter(|_| context.photons.is_some());
+    let gathers = context.photons.is_some() && context.plan.caustics == Some(Caustics::Photons);
+    let footprint = context.footprints.get(index).filter(|_| gathers);
     let lookups = match footprint {
-        _ if context.photons.is_none() => Lookups::Nowhere,
+        _ if !gathers => Lookups::Nowhere,
         None => Lookups::Everywhere,
         Some(footprint) if footprint.only_way => Lookups::Nowhere,
         Some(_) => Lookups::OffFootprint,

@@ -12,7 +12,9 @@ use crate::geometry::Ray;
 use crate::light_path::PathClass;
 use crate::media::Media;
 use crate::optics::{Arrival, Event, Interaction, Outcome, transmittance};
+use crate::radius::Reach;
 use crate::sampling::{SamplePoint, WAVELENGTH_DIMENSION, event_dimension};
+use crate::scene::Caustics;
 use crate::spectrum;
 use glam::{Vec2, Vec3};
 
@@ -29,7 +31,7 @@ const MAX_BOUNCES: u32 = 64;
 const FIRST_EVENT_DIMENSION: u32 = 6;
 
 /// The lens is drawn from these two dimensions of the sample itself; D and S draw from its branches.
-const LENS_DIMENSION: u32 = 14;
+pub(super) const LENS_DIMENSION: u32 = 14;
 
 /// The time is drawn from this dimension of the sample itself.
 const TIME_DIMENSION: u32 = 12;
@@ -43,6 +45,8 @@ pub struct EyeCounts {
     pub shadow_rays: u64,
     /// Look-ups in the photon map.
     pub lookups: u64,
+    /// Look-ups of the nearest photons that found fewer than they asked for.
+    pub short_lookups: u64,
     /// Branches ended by the bounce limit.
     pub cut: u64,
 }
@@ -53,6 +57,7 @@ impl EyeCounts {
         self.eye_rays += other.eye_rays;
         self.shadow_rays += other.shadow_rays;
         self.lookups += other.lookups;
+        self.short_lookups += other.short_lookups;
         self.cut += other.cut;
     }
 }
@@ -71,8 +76,8 @@ pub(super) enum Lookups {
 /// Follows eye rays; owns the stack of branches yet to follow.
 pub(super) struct EyeWalk<'a> {
     pub(super) context: &'a EyeContext<'a>,
-    /// Radius of the density estimate in pixels.
-    pub(super) kernel_pixels: f32,
+    /// How far the density estimate reaches.
+    pub(super) reach: Reach,
     stack: Vec<Branch>,
     /// The eye sample that is being followed.
     pub(super) half: usize,
@@ -121,11 +126,11 @@ pub(super) struct Scattered {
 
 impl<'a> EyeWalk<'a> {
     pub(super) fn new(context: &'a EyeContext<'a>) -> Self {
-        let kernel_pixels = context.plan.radius.pixels(context.round) as f32;
+        let reach = context.plan.radius.reach(context.round);
         let sample = SamplePoint::new(0, 0);
         Self {
             context,
-            kernel_pixels,
+            reach,
             stack: Vec::new(),
             half: 0,
             sample,
@@ -262,12 +267,18 @@ impl<'a> EyeWalk<'a> {
         });
     }
 
+    /// Whether rays that meet a light by chance are what computes the caustics.
+    #[inline]
+    pub(super) fn goes_backward(&self) -> bool {
+        self.context.plan.caustics == Some(Caustics::Backward)
+    }
+
     /// Puts a ray that leaves a D onto the stack.
     pub(super) fn go_on(&mut self, branch: Branch) {
         self.stack.push(branch);
     }
 
-    /// A ray that meets nothing sees the environment. After a D and an S that is the photons' part; after a D alone
+    /// A ray that meets nothing sees the environment. After a D and an S that is the photons' part, if there are any; after a D alone
     /// it is the scattered rays' only where highlights are sharp.
     fn escape(&mut self, branch: &Branch, sums: &mut PixelSums) {
         let (environment, direction) = (&self.context.scene.environment, branch.ray.direction);
@@ -278,6 +289,9 @@ impl<'a> EyeWalk<'a> {
             Some(Scattered { straight: true, pdf: Some(pdf), count, .. }) => {
                 let weight = power_heuristic(pdf, environment_density(environment, direction));
                 classes.add(PathClass::with_light_after(count), radiance * weight);
+            }
+            Some(Scattered { straight: false, count, .. }) if self.goes_backward() => {
+                classes.add(PathClass::with_caustic_after(count), radiance);
             }
             Some(_) => {}
         }

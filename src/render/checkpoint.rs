@@ -1,7 +1,6 @@
 //! A render in progress as bytes: it continues to the same picture as if it had never stopped.
 
 use super::{PassTime, Render};
-use crate::film::Film;
 use crate::pass1_light::Tally;
 use crate::pass2_eye::EyeCounts;
 use crate::plan::Plan;
@@ -10,7 +9,7 @@ use glam::DVec3;
 use std::sync::Arc;
 
 /// First bytes of a checkpoint; the digit is the version of the layout.
-const MAGIC: &[u8; 12] = b"nephroid-cp1";
+const MAGIC: &[u8; 12] = b"nephroid-cp2";
 
 /// Why a checkpoint cannot be continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -32,8 +31,8 @@ impl Render {
             put_f64(&mut out, time.wall);
             put_f64(&mut out, time.cpu);
         }
-        let EyeCounts { eye_rays, shadow_rays, lookups, cut } = self.eye;
-        for count in [eye_rays, shadow_rays, lookups, cut, self.windows.len() as u64] {
+        let EyeCounts { eye_rays, shadow_rays, lookups, short_lookups, cut } = self.eye;
+        for count in [eye_rays, shadow_rays, lookups, short_lookups, cut, self.windows.len() as u64] {
             put_u64(&mut out, count);
         }
         for tally in &self.windows {
@@ -72,6 +71,7 @@ impl Render {
             eye_rays: take_u64(&mut bytes)?,
             shadow_rays: take_u64(&mut bytes)?,
             lookups: take_u64(&mut bytes)?,
+            short_lookups: take_u64(&mut bytes)?,
             cut: take_u64(&mut bytes)?,
         };
         if take_u64(&mut bytes)? != self.windows.len() as u64 {
@@ -80,7 +80,6 @@ impl Render {
         for tally in &mut self.windows {
             *tally = take_tally(&mut bytes)?;
         }
-        let image = self.scene.image;
         self.blocks = take_u32(&mut bytes)?;
         self.effort.photon_shift = take_u32(&mut bytes)?.min(self.plan.most_photon_shift());
         let pixels = take_u32(&mut bytes)? as usize;
@@ -88,7 +87,7 @@ impl Render {
         self.effort.samples = counts.to_vec();
         bytes = rest;
         self.error = take_u32(&mut bytes)?.checked_sub(1).map(f32::from_bits);
-        self.film = Film::from_bytes(image.width, image.height, bytes)?;
+        self.film = self.film.read(bytes)?;
         Some(())
     }
 }

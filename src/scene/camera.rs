@@ -38,6 +38,19 @@ pub enum Projection {
     },
 }
 
+/// How the eye sees a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The ray from the eye to the point.
+    pub ray: Ray,
+    /// Length of the way, m.
+    pub distance: f32,
+    /// Where in the picture, in pixels from the top left corner.
+    pub raster: Vec2,
+    /// Pixels that an area at the point covers if it faces the ray, m⁻².
+    pub pixels_per_area: f32,
+}
+
 /// A thin lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
@@ -101,6 +114,49 @@ impl Camera {
         // Both ends relative to the eye, so that no digits are lost far from the origin.
         let to_focus = self.towards(raster, tan_half_fov) * lens.focus_distance - aside;
         Ray::new(self.eye + aside, to_focus.normalize())
+    }
+
+    /// Where the eye sees a point, through the point of its lens, if it has one, drawn with `u` uniform in the unit
+    /// square; `None` if the point is behind it or beside the picture.
+    #[must_use]
+    pub fn project(&self, point: Vec3, u: Vec2) -> Option<View> {
+        let (ray, distance, on_screen, half_height, pixels_per_area) = match self.projection {
+            Projection::Perspective { tan_half_fov, lens } => {
+                let lens = lens.unwrap_or(Lens { radius: 0.0, focus_distance: 1.0 });
+                let p = concentric_disc(u) * lens.radius;
+                let to = point - self.eye - self.right * p.x - self.up * p.y;
+                let (depth, distance) = (to.dot(self.forward), to.length());
+                // Where the ray crosses the plane at distance 1 from the middle of the lens.
+                let q = p / lens.focus_distance + self.across(to) / depth;
+                let ray = Ray::new(point - to, to / distance);
+                // A pixel's solid angle is its area at distance 1 times the cubed cosine from the axis.
+                let cosine = depth / distance;
+                let solid_angle = self.pixel_width(1.0).powi(2) * cosine.powi(3);
+                (ray, distance, q, tan_half_fov, 1.0 / (distance * distance * solid_angle))
+            }
+            Projection::Orthographic { height } => {
+                let to = point - self.eye;
+                let depth = to.dot(self.forward);
+                let ray = Ray::new(point - self.forward * depth, self.forward);
+                (ray, depth, self.across(to), 0.5 * height, self.pixel_width(1.0).powi(-2))
+            }
+        };
+        let half_width = half_height * (self.resolution.x / self.resolution.y);
+        let ndc = Vec2::new(on_screen.x / half_width, -on_screen.y / half_height);
+        let raster = (ndc + 1.0) * 0.5 * self.resolution;
+        let inside = raster.cmpge(Vec2::ZERO).all() && raster.cmplt(self.resolution).all();
+        let ahead = (point - ray.origin).dot(self.forward) > 0.0;
+        (inside && ahead && pixels_per_area.is_finite()).then_some(View {
+            ray,
+            distance,
+            raster,
+            pixels_per_area,
+        })
+    }
+
+    /// A vector's parts to the right and up.
+    fn across(&self, to: Vec3) -> Vec2 {
+        Vec2::new(to.dot(self.right), to.dot(self.up))
     }
 
     /// From the eye to the plane at distance 1.

@@ -7,13 +7,14 @@ use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
 use super::light_file::LightFile;
 use super::material_file::MaterialFile;
+use super::radius_file::Radius;
 use super::read::{
     Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, name, named, note_duplicates,
     object, optional, or, pair, part, point, real, record, reference, required, seed, slots, tagged,
 };
 use super::schema::Definitions;
 use super::shape_file::{MotionFile, ShapeFile};
-use super::{LightSampling, Paths, Tone};
+use super::{Caustics, LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
 use serde_json::json;
@@ -156,10 +157,14 @@ record! {
     RenderFile {
         /// Which light paths are computed: `whitted` is LS*E and LDS*E, `caustics` also LS+DS*E.
         paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
+        /// What computes the caustics LS+DS*E: photons, or for comparison `backward`, path tracing that meets the lights by
+        /// chance, or `forward`, photons connected to the eye, which leaves out what mirrors and glass show.
+        caustics: Caustics = or(choice(Caustics::NAMED.to_vec()), Caustics::Photons),
         /// When the render ends; at an error of 0.02 or after 60 seconds if left out.
         stop: Option<StopFile> = optional(object::<StopFile>()),
-        /// Radius of the caustics' density estimate: a pixel, or shrinking from round to round.
-        radius: RadiusRule = or(choice(RadiusRule::NAMED.to_vec()), RadiusRule::Pixel),
+        /// Reach of the caustics' density estimate: a `pixel`, smoothed after; and for comparison a radius that shrinks from
+        /// round to round (`progressive`), one that is `fixed`, or that of the `nearest` photons.
+        radius: RadiusRule = or(Radius, RadiusRule::Pixel),
         /// The structure that finds what a ray meets; all find the same.
         structure: Structure = or(choice(Structure::NAMED.to_vec()), Structure::Auto),
         /// How quad and disk lights are sampled: by one point per eye sample (`sobol`), or by the squares of a grid,
@@ -177,6 +182,7 @@ impl Default for RenderFile {
     fn default() -> Self {
         Self {
             paths: Paths::default(),
+            caustics: Caustics::default(),
             stop: None,
             radius: RadiusRule::default(),
             structure: Structure::default(),

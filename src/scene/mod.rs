@@ -17,13 +17,14 @@ mod light_file;
 mod material;
 mod material_file;
 mod mesh_file;
+mod radius_file;
 mod read;
 mod schema;
 mod shape_file;
 pub(crate) mod texture;
 
 pub use assets::{AssetError, AssetSource, DirectoryAssets, MemoryAssets, NoAssets};
-pub use camera::{Camera, Lens, Projection};
+pub use camera::{Camera, Lens, Projection, View};
 pub use check::Warning;
 pub use environment::{Environment, EnvironmentImage, EnvironmentSample};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
@@ -182,6 +183,38 @@ impl std::str::FromStr for Paths {
     }
 }
 
+/// Which estimator computes the caustics, `LS+DS*E`. They agree where all can converge; the others are for comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Caustics {
+    /// Photons stored in pass 1 and gathered in pass 2.
+    #[default]
+    Photons,
+    /// Path tracing: eye paths go on from the first D and count where they meet a light by chance.
+    Backward,
+    /// Light tracing: each photon that rests is connected to the eye; only what it sees directly, `LS+DE`.
+    Forward,
+}
+
+impl Caustics {
+    /// Every value and its name.
+    pub const NAMED: [(&str, Self); 3] =
+        [("photons", Self::Photons), ("backward", Self::Backward), ("forward", Self::Forward)];
+}
+
+/// A value of `caustics` that does not exist.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not one of `photons`, `backward` (path tracing) and `forward` (light tracing)")]
+pub struct UnknownCaustics(String);
+
+impl std::str::FromStr for Caustics {
+    type Err = UnknownCaustics;
+
+    fn from_str(text: &str) -> Result<Self, UnknownCaustics> {
+        let known = Self::NAMED.iter().find(|(name, _)| *name == text);
+        known.map(|(_, caustics)| *caustics).ok_or_else(|| UnknownCaustics(text.to_owned()))
+    }
+}
+
 /// How a quad or disk light is sampled at a D.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LightSampling {
@@ -212,6 +245,8 @@ impl LightSampling {
 pub struct RenderSettings {
     /// Which light paths are computed.
     pub paths: Paths,
+    /// Which estimator computes the caustics.
+    pub caustics: Caustics,
     /// When the render ends; the first limit reached ends it.
     pub stop: Stop,
     /// Radius of the caustics' density estimate.

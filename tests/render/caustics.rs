@@ -5,7 +5,7 @@ use crate::support::{
 };
 use glam::DVec3;
 use nephroid::light_path::PathClass;
-use nephroid::pass1_light::{Block, Tally, Window, trace_block, windows};
+use nephroid::pass1_light::{Block, Region, Tally, Window, trace_block, windows};
 use nephroid::photon_map::Photon;
 use nephroid::render::Control;
 use serde_json::{Value, json};
@@ -271,4 +271,106 @@ fn f60_photons_that_met_no_specular_surface_are_not_stored() {
     let (photons, tally, _) = trace(&value, 1, 14);
     assert_eq!((photons.len(), tally.hit_caster), (0, 0));
     assert!((tally.energy.missed - tally.energy.emitted).abs().max_element() < 1e-12);
+}
+
+/// T26: a sun at 45° through a wide slab of n = 1.5: E cosθ (1 - R)/(1 + R), flat.
+#[test]
+fn t26_a_slab_in_slanting_light_lights_the_floor_evenly() {
+    let face = |y: f64, z: f64| {
+        json!({ "type": "polygon", "material": "glass", "name": format!("face at {y}"),
+                "vertices": [[-2, y, z], [2, y, z], [2, y, -z], [-2, y, -z]] })
+    };
+    let lights = json!([{ "type": "directional", "direction": [1, -1, 0], "irradiance": [1, 1, 1] }]);
+    for x in [-0.3, 0.3] {
+        let objects = json!([floor(1.0, 0.0), face(1.2, 1.0), face(1.0, -1.0)]);
+        let slab = scene(camera_above([x, 0.0, 0.0], 0.5, 0.4), objects, lights.clone());
+        let estimate = over_seeds(|seed| mean_irradiance(&render(&slab, seed, 1, 16), PathClass::Caustic));
+        estimate.assert_is(0.904_327 / 2.0_f64.sqrt(), 0.0);
+    }
+}
+
+/// A paraboloid of focal length 1 whose focus is the origin, opening down, out to radius 2, with its true normals.
+fn paraboloid(rings: u32, segments: u32) -> Value {
+    let mut mesh = (Vec::new(), Vec::new(), Vec::new());
+    for ring in 0..=rings {
+        let r = 2.0 * f64::from(ring) / f64::from(rings);
+        for segment in 0..=segments {
+            let angle = std::f64::consts::TAU * f64::from(segment) / f64::from(segments);
+            let (x, z) = (r * angle.cos(), r * angle.sin());
+            mesh.0.push([x, 1.0 - 0.25 * r * r, z]);
+            mesh.1.push([0.5 * x, 1.0, 0.5 * z]);
+            if ring < rings && segment < segments {
+                let (a, b) = (ring * (segments + 1) + segment, (ring + 1) * (segments + 1) + segment);
+                // The triangles at the vertex itself would have no area.
+                if ring > 0 {
+                    mesh.2.push([a, a + 1, b]);
+                }
+                mesh.2.push([a + 1, b + 1, b]);
+            }
+        }
+    }
+    json!({ "type": "mesh", "material": "mirror", "positions": mesh.0, "normals": mesh.1, "triangles": mesh.2 })
+}
+
+/// T30: a light in the focus of a paraboloid of reflectance 0.9 lights a floor by 0.9 I / (f² (1 + r²/4f²)²).
+#[test]
+fn t30_a_paraboloid_lights_the_floor_with_the_known_profile() {
+    let profile = |x: f64, z: f64| (1.0 + 0.25 * (x * x + z * z)).powi(-2);
+    for (r, known) in [(0.5, 0.885_813), (1.0, 0.64), (2.0, 0.25)] {
+        assert!((profile(r, 0.0) - known).abs() < 1e-6);
+    }
+    let lights = json!([{ "type": "point", "position": [0, 0, 0], "intensity": [1, 1, 1] }]);
+    for r in [0.0, 0.5, 1.0, 1.5] {
+        let objects = json!([floor(3.0, -1.0), paraboloid(64, 128)]);
+        let value = scene(camera_above([r, -1.0, 0.0], 0.5, 0.4), objects, lights.clone());
+        let estimate = over_seeds(|seed| mean_irradiance(&render(&value, seed, 1, 17), PathClass::Caustic));
+        // The mesh is flat between its vertices: its slope is off by up to 1/64.
+        estimate.assert_is(0.9 * mean_over_square(r, 0.0, 0.4, profile), 5e-3);
+    }
+}
+
+/// T31, `LSDSE`: T24's patch of floor, seen from below in a second mirror of reflectance 0.9 above it.
+#[test]
+fn t31_a_mirrors_light_seen_in_a_second_mirror() {
+    let wall = json!({ "type": "polygon", "material": "mirror",
+                       "vertices": [[1, 0, -1], [1, 0, 1], [1, 0.6, 1], [1, 0.6, -1]] });
+    // So small, and the wall so low, that light by way of both does not reach the patch.
+    let above = json!({ "type": "polygon", "material": "mirror", "name": "above",
+                        "vertices": [[0.35, 2, -0.15], [0.65, 2, -0.15], [0.65, 2, 0.15], [0.35, 2, 0.15]] });
+    let lights = json!([{ "type": "point", "position": [0, 1, 0], "intensity": [1, 1, 1] }]);
+    let image_source = |x: f64, z: f64| {
+        let to = DVec3::new(2.0 - x, 1.0, -z);
+        0.9 * to.y / to.length().powi(3)
+    };
+    // The eye's image is 3 above the floor, and sees three times what it sees of the mirror.
+    let camera = camera_above([0.5, 2.0, 0.0], -1.0, 0.2 / 3.0);
+    let value = scene(camera, json!([floor(2.0, 0.0), wall, above]), lights);
+    let estimate = over_seeds(|seed| mean_irradiance(&render(&value, seed, 1, 17), PathClass::Caustic));
+    estimate.assert_is(0.9 * mean_over_square(0.5, 0.0, 0.2, image_source), 0.0);
+}
+
+/// F56: a mirror that reaches to the horizon has no window that bounds it usefully: light goes everywhere, and what
+/// comes back is that of the light's image.
+#[test]
+fn f56_a_mirror_to_the_horizon_is_lit_from_all_directions() {
+    let mut mirror = floor(1e5, 0.0);
+    mirror["material"] = json!("mirror");
+    let lights = json!([{ "type": "point", "position": [0, 1, 0], "intensity": [1, 1, 1] }]);
+    let value = scene(camera_above([0.0, 2.0, 0.0], -0.5, 0.8), json!([mirror, floor(2.0, 2.0)]), lights);
+    assert!(windows(&compile(&value)).iter().all(|w| w.region == Region::AllDirections));
+    let estimate = over_seeds(|seed| mean_irradiance(&render(&value, seed, 1, 16), PathClass::Caustic));
+    let image_source = |x: f64, z: f64| 0.9 * 3.0 / (x * x + z * z + 9.0).powf(1.5);
+    estimate.assert_is(mean_over_square(0.0, 0.0, 0.8, image_source), 0.0);
+}
+
+/// F59: counts go on beyond 2^32, and a sum of many small powers does not stall as it would in f32, at 0.25.
+#[test]
+fn f59_counts_and_sums_hold_any_number_of_photons() {
+    let mut part = Tally { sent: 1 << 31, stored: 1 << 31, ..Tally::default() };
+    let mut sum = Tally::default();
+    (0..4).for_each(|_| sum.add(&part));
+    assert_eq!((sum.sent, sum.stored), (1 << 33, 1 << 33));
+    part.energy.stored = DVec3::splat(1e-8);
+    (0..60_000_000).for_each(|_| sum.add(&part));
+    assert!((sum.energy.stored.y - 0.6).abs() < 1e-6, "{}", sum.energy.stored.y);
 }

@@ -25,6 +25,7 @@ mod optics;
 mod photon_map;
 mod picture;
 mod plan;
+mod rivals;
 mod scattering;
 mod scene_file;
 mod schema;

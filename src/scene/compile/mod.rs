@@ -233,8 +233,9 @@ impl<'f> Compiler<'f> {
                 Stop { error: error.map(|e| e as f32), seconds: *seconds, rounds: *rounds }
             }
         };
-        let RenderFile { paths, radius, structure, light_sampling, light_grid, seed, stop: _ } = *render;
-        Some(RenderSettings { paths, stop, radius, structure, light_sampling, light_grid, seed })
+        let RenderFile { paths, caustics, radius, structure, light_sampling, light_grid, seed, stop: _ } =
+            *render;
+        Some(RenderSettings { paths, caustics, stop, radius, structure, light_sampling, light_grid, seed })
     }
 }
 
