@@ -40,6 +40,8 @@ pub struct Footprint {
     pub area: f32,
     /// True if the eye's ray does not split on the way: the main way is the only one.
     pub only_way: bool,
+    /// True if it is seen without any S between.
+    pub direct: bool,
 }
 
 /// Where one ray of the main way ends.
@@ -147,7 +149,7 @@ impl Footprint {
         }
         let only_way = around.iter().all(|l| l.only_way);
         let view = view_code(first.sheet, first.key);
-        Some(Self { corners, normal, sheet: first.sheet, view, area, only_way })
+        Some(Self { corners, normal, sheet: first.sheet, view, area, only_way, direct: first.key == 1 })
     }
 
     /// Middle of the corners.
