@@ -47,15 +47,15 @@ pub struct Spread {
 const MOST_DEPTH: u32 = 2;
 
 /// How far the probe may land from where it would between the corners' landing points, in pixels.
-const STRAIGHTNESS: f32 = 0.3;
+const STRAIGHTNESS: f32 = 0.2;
 
-/// A part of a light is probed at one of these points, by chance: in the middle, what is odd about it would not show
-/// (three images of one point near a cusp).
-const PROBES: [(f32, f32); 4] = [(0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)];
+/// A part of a light is probed at one of these points, by chance. In the middle what is odd would not show (three images
+/// of one point near a cusp), on the diagonals not a saddle, which is 0 there as at the corners.
+const PROBES: [(f32, f32); 4] = [(0.275, 0.1), (0.9, 0.275), (0.725, 0.9), (0.1, 0.725)];
 
-/// The mean of a quadratic map over a square, beyond that of its corners, over what it is beyond them at a probe:
-/// 1/6 over 1/4 · 3/4.
-const MEAN_OVER_PROBE: f32 = 8.0 / 9.0;
+/// What the mean of a quadratic map over a square is beyond that of its corners, over what it is beyond them at a
+/// probe, in the mean over the probes: of a square, -2/3 over the mean of 0.45² - 1 and 0.8² - 1.
+const MEAN_OVER_PROBE: f32 = 1.152;
 
 /// Tells the stream that draws the probe from the others.
 const PROBE_STREAM: u64 = 0x9_0be;

@@ -106,6 +106,12 @@ impl Footprints {
         self.pixels.get(index)?.as_ref()
     }
 
+    /// True if any footprint is seen without any S between.
+    #[must_use]
+    pub fn any_direct(&self) -> bool {
+        self.pixels.iter().flatten().any(|footprint| footprint.direct)
+    }
+
     /// Number of pixels, and pixels across.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {

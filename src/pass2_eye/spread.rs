@@ -9,11 +9,13 @@ use super::outline::Coverage;
 use crate::geometry::SheetId;
 use crate::pass1_light::{LightImage, Spread};
 use crate::photon_map::Photon;
+use crate::sampling::hash;
 use crate::scene::Camera;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Irradiance that the pixels' footprints get, row by row; 0 where a footprint is not seen directly.
+/// Irradiance that the pixels' footprints get, row by row; 0 where a footprint is not seen directly, and empty if none
+/// is.
 #[derive(Debug, Default)]
 pub struct Irradiance {
     pixels: Vec<Vec3>,
@@ -60,8 +62,11 @@ impl Irradiance {
     #[must_use]
     pub fn gather(camera: &Camera, footprints: &Footprints, spread: &Spread) -> Self {
         let (count, width) = footprints.size();
+        if !footprints.any_direct() {
+            return Self::default();
+        }
         let mut patches = Vec::with_capacity(spread.images.len() + spread.points.len());
-        let on_screen = Screen { camera, size: Vec2::new(width as f32, (count / width.max(1)) as f32) };
+        let on_screen = Screen { camera, size: Vec2::new(width as f32, (count / width) as f32) };
         spread.images.iter().for_each(|image| on_screen.place_image(image, &mut patches));
         for photon in &spread.points {
             on_screen.place(Light::from(photon), &mut patches);
@@ -79,7 +84,7 @@ impl Irradiance {
         Self { pixels }
     }
 
-    /// Irradiance of a pixel.
+    /// Irradiance of a pixel whose footprint is seen directly.
     #[inline]
     #[must_use]
     pub fn get(&self, index: usize) -> Vec3 {
@@ -131,7 +136,8 @@ impl Screen<'_> {
         let longest = (a - b).length().max((c - d).length()).max((a - d).length().max((b - c).length()));
         let thickness = |p: Vec2, q: Vec2, r: Vec2| (q - p).perp_dot(r - p).abs() / longest;
         let thin = thickness(a, b, c).min(thickness(a, c, d)) < THINNEST;
-        if thin || areas[0].min(areas[1]) <= 0.0 || !((high - low).max_element() < WIDEST) {
+        let extent = (high - low).max_element();
+        if thin || areas[0].min(areas[1]) <= 0.0 || extent >= WIDEST || extent.is_nan() {
             let across = (a - b).length().max((c - d).length());
             let down = (a - d).length().max((b - c).length());
             let counts = (Vec2::new(across, down) * DENSITY).ceil();
@@ -145,21 +151,32 @@ impl Screen<'_> {
         ));
     }
 
-    /// A grid of points in place of an image.
+    /// A grid of points in place of an image, jittered as a whole so that it lights in the mean what the image does: where
+    /// many small images meet in a focus, middles alone would make it too sharp.
     fn place_points(&self, image: &LightImage, counts: Vec2, patches: &mut Vec<Placed<'_>>) {
         let [a, b, c, d] = image.corners;
         let (across, down) = (counts.x as u32, counts.y as u32);
         let power = image.power / (across * down) as f32;
+        let jitter = jitter(image);
         for j in 0..down {
-            let t = (j as f32 + 0.5) / counts.y;
+            let t = (j as f32 + jitter.y) / counts.y;
             for i in 0..across {
-                let s = (i as f32 + 0.5) / counts.x;
+                let s = (i as f32 + jitter.x) / counts.x;
                 let position = a.lerp(b, s).lerp(d.lerp(c, s), t);
                 let light = Light { position, direction: image.direction, sheet: image.sheet, power };
                 self.place(light, patches);
             }
         }
     }
+}
+
+/// Two numbers in [0, 1) that differ from image to image.
+fn jitter(image: &LightImage) -> Vec2 {
+    let [a, _, c, _] = image.corners.map(|corner| corner.to_array().map(f32::to_bits));
+    let word = |x: u32, y: u32| u64::from(x) << 32 | u64::from(y);
+    let bits = hash(hash(word(a[0], a[1]), word(a[2], c[0])), word(c[1], c[2]));
+    let unit = |bits: u64| (bits & 0xff_ffff) as f32 / 16_777_216.0;
+    Vec2::new(unit(bits >> 40), unit(bits))
 }
 
 /// A band of rows of pixels.
