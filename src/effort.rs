@@ -39,6 +39,9 @@ const PHOTON_OVERHEAD: f32 = 2.0;
 /// Most eye samples of a pixel and half in one round.
 const MOST_SAMPLES: f32 = 32.0;
 
+/// A round gives a pixel at most this many times the samples it had: few do not decide on many.
+const MOST_GROWTH: f32 = 8.0;
+
 /// Least, on average: so that what the first samples missed is found.
 const LEAST_SAMPLES: f32 = 0.25;
 
@@ -97,12 +100,11 @@ fn wanted_samples(measured: &Measured<'_>) -> Vec<f32> {
     (0..per_sample.len()).map(|i| (around(i) / measured.rays_per_sample.max(1.0)).sqrt()).collect()
 }
 
-/// Samples of each pixel: not more than twice what it had, so that a few do not decide on many. Fractions of a
-/// sample are rounded up as often as they are large.
+/// Samples of each pixel. Fractions of a sample are rounded up as often as they are large.
 fn samples(wanted: &[f32], had: &[u32], scale: f32, key: u64) -> Vec<u8> {
     let round = |(i, (w, &had)): (usize, (&f32, &u32))| {
         let dither = (hash(key, i as u64) >> 40) as f32 / (1_u64 << 24) as f32;
-        let most = MOST_SAMPLES.min(2.0 * had.max(1) as f32);
+        let most = MOST_SAMPLES.min(MOST_GROWTH * had.max(1) as f32);
         ((w * scale).clamp(LEAST_SAMPLES, most) + dither).floor() as u8
     };
     wanted.iter().zip(had).enumerate().map(round).collect()

@@ -3,15 +3,15 @@
 use crate::effort::MOST_SHIFT;
 use crate::film::Film;
 use crate::media::Media;
-use crate::pass1_light::{self, Block, Budget, Source, Tally, Window};
-use crate::pass2_eye::Footprints;
-use crate::photon_map;
+use crate::pass1_light::{self, Block, Budget, Carries, Source, Tally, Window};
+use crate::pass2_eye::{Footprints, Irradiance};
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
 use crate::scene::{Caustics, Environment, Light, LightSampling, Material, ObjectId, Paths, Scene, Warning};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
+mod carry;
 mod reach;
 mod rivals;
 
@@ -57,6 +57,9 @@ const PILOT_LOG2: u32 = 13;
 /// Least photons per window, half and round.
 const LEAST_LOG2: u32 = 8;
 
+/// Each light image takes several rays, and is worth many photons: as many powers of two fewer are sent.
+const LESS_LOG2: u32 = 3;
+
 /// Most photons per half and round in all: bounds the memory of a round.
 const MOST_LOG2: u32 = 21;
 
@@ -72,6 +75,8 @@ struct Pilot {
     sent: u32,
     /// Specular objects that they have met.
     met: BTreeSet<ObjectId>,
+    /// What its photons should carry.
+    carries: Carries,
 }
 
 impl Plan {
@@ -206,16 +211,25 @@ impl Plan {
             }
             // A power of two at least as large as the share: blocks of the sequence stay aligned.
             let log2_block = (f64::from(per_round) + share.log2()).ceil().max(f64::from(LEAST_LOG2)) as u32;
-            self.photons.push(Budget { window: pilot.window, log2_block });
+            let carries = pilot.carries;
+            let log2_block = match carries {
+                Carries::Points => log2_block,
+                Carries::LightImages => log2_block.saturating_sub(LESS_LOG2).max(LEAST_LOG2),
+            };
+            self.photons.push(Budget { window: pilot.window, log2_block, carries });
         }
         self.decide_gathering(scene);
         let sent: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
         let kept = self.photons.len();
+        let images = self.photons.iter().filter(|b| b.carries == Carries::LightImages).count();
         let guided = self.photons.iter().filter(|b| b.window.guide.is_some()).count();
         self.decide(
             "pass 1",
             true,
-            format!("{sent} photons a round through {kept} windows"),
+            match images {
+                0 => format!("{sent} photons a round through {kept} windows"),
+                images => format!("{sent} photons a round through {kept} windows, {images} of them with images of the light"),
+            },
             format!("{kept} of {all} pairs of light and specular object throw light onto a surface; each gets photons by the light it delivers, {guided} of them through a table of where they arrive from"),
         );
     }
@@ -308,24 +322,26 @@ impl Plan {
         if self.moves {
             return 0;
         }
-        let photons: u64 = self.photons.iter().map(|b| 1_u64 << b.log2_block).sum();
+        let in_photons = |b: &Budget| match b.carries {
+            Carries::Points => 1_u64 << b.log2_block,
+            Carries::LightImages => 1_u64 << (b.log2_block + LESS_LOG2),
+        };
+        let photons: u64 = self.photons.iter().map(in_photons).sum();
         MOST_LOG2.saturating_sub(photons.max(1).next_power_of_two().ilog2()).min(MOST_SHIFT)
     }
 
     fn estimate_memory(&self, scene: &Scene) -> u64 {
-        let a_round: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
+        let a_round: u64 = self.photons.iter().map(Budget::bytes).sum();
         let photons = a_round << self.most_photon_shift();
-        // While a tree is built its photons stand in memory in three forms: as traced (56 bytes), as entries
-        // and in the tree's arrays, which double as they grow.
-        let per_photon = 56 + 3 * photon_map::BYTES_PER_PHOTON;
         let (width, height) = (scene.image.width, scene.image.height);
         let pixels = u64::from(width) * u64::from(height);
         let film = Film::bytes(width, height);
         // A round and its tiles, while it is made, or the ladder of widths, while it is smoothed.
         let passing =
             if self.photons.is_empty() { 2 * film } else { (2 * film).max(pixels * SMOOTHING_BYTES) };
-        let footprints = if self.photons.is_empty() { 0 } else { pixels * Footprints::BYTES_PER_PIXEL };
-        scene.geometry.memory_bytes() + scene.image_bytes + film + footprints + passing + photons * per_photon
+        let per_pixel = Footprints::BYTES_PER_PIXEL + Irradiance::BYTES_PER_PIXEL;
+        let footprints = if self.photons.is_empty() { 0 } else { pixels * per_pixel };
+        scene.geometry.memory_bytes() + scene.image_bytes + film + footprints + passing + photons
     }
 }
 
@@ -347,7 +363,8 @@ fn pilot(scene: &Scene, mut window: Window, index: u64) -> Pilot {
         (tally, guide, met) = run(&window, log2);
     }
     window.guide = guide;
-    Pilot { window, tally, sent: 1 << log2, met }
+    let carries = carry::decide(scene, &window, hash(seed, index));
+    Pilot { window, tally, sent: 1 << log2, met, carries }
 }
 
 /// A window's source in words.

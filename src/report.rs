@@ -28,6 +28,7 @@ pub fn plan_json(scene: &Scene, plan: &Plan) -> Value {
                 "light": source_name(scene, budget.window.source),
                 "caster": scene.objects[budget.window.caster.index()].name,
                 "photons_per_round": 2_u64 << budget.log2_block,
+                "carries": budget.carries.as_str(),
             })
         })
         .collect();

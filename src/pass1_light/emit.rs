@@ -30,6 +30,15 @@ pub struct EmittedPhoton {
     pub power: Vec3,
 }
 
+/// A point of a window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Aim {
+    /// The point, in the window's unit square.
+    through: Vec2,
+    /// Density with which it was drawn.
+    density: f32,
+}
+
 /// A point on a light and its one-sided emission there.
 struct Origin {
     point: Vec3,
@@ -60,14 +69,25 @@ impl<'a> Emission<'a> {
     /// Draws a photon; `None` where the light gives nothing in the drawn direction.
     #[must_use]
     pub fn sample(&self, sample: SamplePoint) -> Option<EmittedPhoton> {
+        self.emit(self.aim(sample), sample.get_2d(2))
+    }
+
+    /// The point of the window that a sample goes through.
+    #[inline]
+    pub(super) fn aim(&self, sample: SamplePoint) -> Aim {
         let (through, density) = match &self.window.guide {
             Some(guide) => guide.warp(sample.get_2d(0)),
             None => (sample.get_2d(0), 1.0),
         };
+        Aim { through, density }
+    }
+
+    /// The photon from a point of the unit square, which the light's surface or directions are mapped to, through
+    /// a point of the window.
+    pub(super) fn emit(&self, aim: Aim, on_light: Vec2) -> Option<EmittedPhoton> {
+        let Aim { through, density } = aim;
         let mut photon = match &self.source {
-            Sampler::Environment(environment) => {
-                self.emit_from_environment(environment, through, sample.get_2d(2))
-            }
+            Sampler::Environment(environment) => self.emit_from_environment(environment, through, on_light),
             Sampler::Light(Light::Directional { direction, irradiance }) => {
                 self.emit_from_afar(*direction, *irradiance, through)
             }
@@ -77,18 +97,18 @@ impl<'a> Emission<'a> {
             }
             Sampler::Light(Light::Spot(spot)) => self.emit_from_spot(spot, through),
             Sampler::Light(Light::Quad(quad)) => {
-                let point = point_on_quad(quad, sample.get_2d(2));
+                let point = point_on_quad(quad, on_light);
                 self.emit_from_point(&Origin::on(&point, quad.radiance * quad.area()), through)
             }
             Sampler::Light(Light::Disk(disk)) => {
-                let point = point_on_disk(disk, sample.get_2d(2));
+                let point = point_on_disk(disk, on_light);
                 self.emit_from_point(&Origin::on(&point, disk.radiance * disk.area()), through)
             }
             Sampler::Light(Light::Mesh(mesh)) => {
-                let point = mesh.sample(sample.get_2d(2))?;
+                let point = mesh.sample(on_light)?;
                 self.emit_from_point(&Origin::on(&point, mesh.radiance * mesh.area()), through)
             }
-            Sampler::Light(Light::Sphere(sphere)) => self.emit_from_sphere(sphere, through, sample.get_2d(2)),
+            Sampler::Light(Light::Sphere(sphere)) => self.emit_from_sphere(sphere, through, on_light),
         }?;
         photon.power /= density;
         (photon.power.max_element() > 0.0).then_some(photon)

@@ -4,25 +4,31 @@
 mod emit;
 mod energy;
 mod guide;
+mod light_image;
 mod walk;
 mod window;
 
 pub use emit::Emission;
 pub use energy::{Energy, Tally};
 pub use guide::Guide;
+pub use light_image::{LightImage, Spread};
 pub use window::{Region, Source, Window, windows};
 
-use crate::photon_map::{Photon, PhotonMap};
+use crate::photon_map::{self, Photon, PhotonMap};
 use crate::render::{Control, RenderError};
 use crate::sampling::{SamplePoint, TIME_DIMENSION, hash};
 use crate::scene::{ObjectId, Scene};
 use guide::Lesson;
+use light_image::{ImageTracer, Shot};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use walk::{PhotonWalk, Step};
 
 /// Photons traced between two looks at the cancel flag; also the unit of parallel work.
 const BATCH: u32 = 4096;
+
+/// Light images traced between two looks at the cancel flag: each takes about ten times a photon's rays.
+const IMAGE_BATCH: u32 = BATCH / 8;
 
 /// A window and how many photons each round sends through it.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,12 +37,54 @@ pub struct Budget {
     pub window: Window,
     /// Each half of a round takes a block of 2^`log2_block` points of the window's sequence.
     pub log2_block: u32,
+    /// What the points of the sequence bring to pixels that see the receiver directly.
+    pub carries: Carries,
+}
+
+impl Carries {
+    /// The choice's name on the wire.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Points => "points",
+            Self::LightImages => "light_images",
+        }
+    }
+}
+
+/// Light images that a point of a window gives, at most on average; their cost in memory follows.
+const IMAGES_PER_POINT: u64 = 8;
+
+impl Budget {
+    /// Bytes in both halves of a round of one block: photons as traced, as entries of a tree and in the tree's arrays,
+    /// which double as they grow, and light images, here and on the screen.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let photon = 2 * size_of::<Photon>() as u64 + 3 * photon_map::BYTES_PER_PHOTON;
+        let images = match self.carries {
+            Carries::Points => 0,
+            Carries::LightImages => 2 * IMAGES_PER_POINT * size_of::<LightImage>() as u64,
+        };
+        (2 << self.log2_block) * (photon + images)
+    }
+}
+
+/// How the light through a point of a window is spread over what pixels see directly; what they see through mirrors and
+/// glass is lit by plain photons.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Carries {
+    /// Plain photons: one point of the light lights one point of the receiver.
+    Points,
+    /// The image of the whole light.
+    LightImages,
 }
 
 /// The photons of one round in two independent halves, and what became of all light that was sent.
 pub struct RoundPhotons {
     /// One map per half.
     pub maps: [PhotonMap; 2],
+    /// The same light for pixels that see it directly, per half.
+    pub spreads: [Spread; 2],
     /// When the photons of each half have flown.
     pub times: [f32; 2],
     /// Energy per window, summed over both halves (each half carries the window's whole flux).
@@ -44,10 +92,11 @@ pub struct RoundPhotons {
 }
 
 /// The same, before the trees are built.
-#[derive(Clone, Debug, PartialEq)]
 pub struct RoundLists {
     /// The photons of each half.
     pub halves: [Vec<Photon>; 2],
+    /// The same light for pixels that see it directly, per half.
+    pub spreads: [Spread; 2],
     /// When they have flown.
     pub times: [f32; 2],
     /// As in [`RoundPhotons`].
@@ -89,15 +138,14 @@ pub fn emit_lists(
     blocks: Blocks,
     control: &Control,
 ) -> Result<RoundLists, RenderError> {
-    let (a, tallies_a) = emit_half(scene, budgets, blocks, 0, control)?;
-    let (b, tallies_b) = emit_half(scene, budgets, blocks, 1, control)?;
-    let mut sum = vec![Tally::default(); budgets.len()];
-    for half in [&tallies_a, &tallies_b] {
-        for (total, tally) in sum.iter_mut().zip(half) {
-            total.add(tally);
-        }
+    let a = emit_half(scene, budgets, blocks, 0, control)?;
+    let b = emit_half(scene, budgets, blocks, 1, control)?;
+    let mut tallies = a.tallies;
+    for (total, tally) in tallies.iter_mut().zip(&b.tallies) {
+        total.add(tally);
     }
-    Ok(RoundLists { halves: [a, b], times: blocks.times, tallies: sum })
+    let (halves, spreads) = ([a.photons, b.photons], [a.spread, b.spread]);
+    Ok(RoundLists { halves, spreads, times: blocks.times, tallies })
 }
 
 impl RoundLists {
@@ -106,8 +154,15 @@ impl RoundLists {
     pub fn into_maps(self) -> RoundPhotons {
         let [a, b] = &self.halves;
         let (a, b) = rayon::join(|| PhotonMap::build(a), || PhotonMap::build(b));
-        RoundPhotons { maps: [a, b], times: self.times, tallies: self.tallies }
+        RoundPhotons { maps: [a, b], spreads: self.spreads, times: self.times, tallies: self.tallies }
     }
+}
+
+/// What one half of a round finds.
+struct HalfPhotons {
+    photons: Vec<Photon>,
+    spread: Spread,
+    tallies: Vec<Tally>,
 }
 
 fn emit_half(
@@ -116,19 +171,30 @@ fn emit_half(
     blocks: Blocks,
     half: u32,
     control: &Control,
-) -> Result<(Vec<Photon>, Vec<Tally>), RenderError> {
-    let mut photons = Vec::new();
-    let mut tallies = Vec::with_capacity(budgets.len());
+) -> Result<HalfPhotons, RenderError> {
+    let mut all = HalfPhotons {
+        photons: Vec::new(),
+        spread: Spread::default(),
+        tallies: Vec::with_capacity(budgets.len()),
+    };
     for (index, budget) in budgets.iter().enumerate() {
         let size = 1_u32 << budget.log2_block;
         let seed = window_seed(scene.render.seed, index, half);
         let block = Block { first: blocks.first.wrapping_mul(size), count: blocks.count * size, seed };
         let time = blocks.times[half as usize];
-        let (mut found, tally) = trace_block_at(scene, &budget.window, (block, time), control)?;
-        photons.append(&mut found);
-        tallies.push(tally);
+        let (mut found, mut tally) = trace_block_at(scene, &budget.window, (block, time), control)?;
+        match budget.carries {
+            Carries::Points => all.spread.points.extend_from_slice(&found),
+            Carries::LightImages => {
+                let (mut spread, rays) = trace_images_at(scene, &budget.window, (block, time), control)?;
+                all.spread.append(&mut spread);
+                tally.rays += rays;
+            }
+        }
+        all.photons.append(&mut found);
+        all.tallies.push(tally);
     }
-    Ok((photons, tallies))
+    Ok(all)
 }
 
 /// Seed of a window's sequence for one half.
@@ -206,10 +272,57 @@ fn trace_batch(
         tally.energy.emitted += photon.power.as_dvec3();
         walk.trace(photon, sample, &mut tally, |step| match step {
             Step::Rests(photon) => photons.push(photon),
-            Step::Meets(_) => {}
+            Step::Meets(..) => {}
         });
     }
     (photons, tally)
+}
+
+/// Traces the images of a window's light through a block of points when the shutter opens, in the order of the points:
+/// as much light as the photons of [`trace_block`] bring. Also the number of rays.
+///
+/// # Errors
+/// [`RenderError::Cancelled`] if the control says so.
+pub fn trace_images(
+    scene: &Scene,
+    window: &Window,
+    block: Block,
+    control: &Control,
+) -> Result<(Spread, u64), RenderError> {
+    trace_images_at(scene, window, (block, 0.0), control)
+}
+
+/// [`trace_images`] at another time.
+fn trace_images_at(
+    scene: &Scene,
+    window: &Window,
+    (block, time): (Block, f32),
+    control: &Control,
+) -> Result<(Spread, u64), RenderError> {
+    let emission = Emission::new(scene, window);
+    let walk = PhotonWalk::new(scene, window);
+    let tracer = ImageTracer { emission: &emission, walk: &walk, camera: &scene.camera };
+    let share = 1.0 / block.count as f32;
+    let batches = (0..block.count.div_ceil(IMAGE_BATCH))
+        .into_par_iter()
+        .map(|batch| {
+            control.check()?;
+            let mut spread = Spread::default();
+            let mut rays = 0;
+            for i in batch * IMAGE_BATCH..((batch + 1) * IMAGE_BATCH).min(block.count) {
+                let sample = SamplePoint::new(block.seed, block.first.wrapping_add(i));
+                let shot = Shot { sample, aim: emission.aim(sample), share, time };
+                rays += tracer.trace(shot, &mut spread);
+            }
+            Ok((spread, rays))
+        })
+        .collect::<Result<Vec<_>, RenderError>>()?;
+    let mut all = (Spread::default(), 0);
+    for (mut spread, rays) in batches {
+        all.0.append(&mut spread);
+        all.1 += rays;
+    }
+    Ok(all)
 }
 
 /// Sends a block of pilot photons through a window, and learns where those come from that arrive, and which S they
@@ -232,7 +345,7 @@ pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Gui
         let mut power = 0.0;
         walk.trace(photon, sample, &mut tally, |step| match step {
             Step::Rests(photon) => power += photon.power.element_sum(),
-            Step::Meets(object) => _ = met.insert(object),
+            Step::Meets(object, _) => _ = met.insert(object),
         });
         if power > 0.0 {
             lesson.delivered(sample.get_2d(0), power);

@@ -5,7 +5,7 @@ use super::energy::Tally;
 use super::window::Window;
 use crate::geometry::{Hit, Ray};
 use crate::media::Media;
-use crate::optics::{Arrival, Interaction, Outcome, resting_scale, transmittance};
+use crate::optics::{Arrival, Event, Interaction, Outcome, resting_scale, transmittance};
 use crate::photon_map::Photon;
 use crate::sampling::{SamplePoint, WAVELENGTH_DIMENSION, event_dimension};
 use crate::scene::{ObjectId, Scene};
@@ -23,8 +23,8 @@ const ROULETTE_BELOW: f32 = 0.05;
 
 /// What happens to a photon on its way.
 pub(super) enum Step {
-    /// It goes on from an S.
-    Meets(ObjectId),
+    /// It goes on from an S, one way or the other.
+    Meets(ObjectId, Event),
     /// It comes to rest on a D.
     Rests(Photon),
 }
@@ -90,15 +90,15 @@ impl<'a> PhotonWalk<'a> {
                 power -= resting;
             }
             let dimension = event_dimension(FIRST_EVENT_DIMENSION, bounce);
-            let Some((outcome, weight)) = choose(&interaction, sample.get(dimension)) else {
+            let Some((outcome, weight)) = choose(&interaction, || sample.get(dimension)) else {
                 tally.energy.absorbed += power.as_dvec3();
                 return;
             };
-            tell(Step::Meets(hit.object));
+            tell(Step::Meets(hit.object, outcome.event));
             let kept = left * weight;
             tally.energy.absorbed += power.as_dvec3() - kept.as_dvec3();
             power = kept;
-            if !survive(&mut power, first_power, sample.get(dimension + 1), tally) {
+            if !survive(&mut power, first_power, || sample.get(dimension + 1), tally) {
                 return;
             }
             let origin = arrival.origin_toward(outcome.direction);
@@ -111,11 +111,11 @@ impl<'a> PhotonWalk<'a> {
 }
 
 /// Picks reflection or refraction in proportion to their shares; also the factor on the photon's power.
-fn choose(interaction: &Interaction, u: f32) -> Option<(Outcome, Vec3)> {
+fn choose(interaction: &Interaction, u: impl Fn() -> f32) -> Option<(Outcome, Vec3)> {
     let (outcome, probability) = match (interaction.reflected, interaction.refracted) {
         (Some(a), Some(b)) => {
             let share = a.fraction.max_element() / (a.fraction + b.fraction).max_element();
-            if u < share { (a, share) } else { (b, 1.0 - share) }
+            if u() < share { (a, share) } else { (b, 1.0 - share) }
         }
         (Some(only), None) | (None, Some(only)) => (only, 1.0),
         (None, None) => return None,
@@ -124,13 +124,13 @@ fn choose(interaction: &Interaction, u: f32) -> Option<(Outcome, Vec3)> {
 }
 
 /// Roulette for weak photons; false if this one ends.
-fn survive(power: &mut Vec3, first_power: f32, u: f32, tally: &mut Tally) -> bool {
+fn survive(power: &mut Vec3, first_power: f32, u: impl Fn() -> f32, tally: &mut Tally) -> bool {
     let strength = power.max_element() / first_power;
     if strength >= ROULETTE_BELOW {
         return true;
     }
     let probability = strength / ROULETTE_BELOW;
-    if u >= probability {
+    if u() >= probability {
         tally.cut += 1;
         tally.energy.cut += power.as_dvec3();
         return false;

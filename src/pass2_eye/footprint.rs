@@ -40,6 +40,8 @@ pub struct Footprint {
     pub area: f32,
     /// True if the eye's ray does not split on the way: the main way is the only one.
     pub only_way: bool,
+    /// True if it is seen without any S between.
+    pub direct: bool,
 }
 
 /// Where one ray of the main way ends.
@@ -104,6 +106,12 @@ impl Footprints {
         self.pixels.get(index)?.as_ref()
     }
 
+    /// True if any footprint is seen without any S between.
+    #[must_use]
+    pub fn any_direct(&self) -> bool {
+        self.pixels.iter().flatten().any(|footprint| footprint.direct)
+    }
+
     /// Number of pixels, and pixels across.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
@@ -147,7 +155,7 @@ impl Footprint {
         }
         let only_way = around.iter().all(|l| l.only_way);
         let view = view_code(first.sheet, first.key);
-        Some(Self { corners, normal, sheet: first.sheet, view, area, only_way })
+        Some(Self { corners, normal, sheet: first.sheet, view, area, only_way, direct: first.key == 1 })
     }
 
     /// Middle of the corners.

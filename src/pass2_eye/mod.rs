@@ -4,11 +4,14 @@ mod arrive;
 mod direct;
 mod footprint;
 mod forward;
+mod outline;
 mod specular;
+mod spread;
 
 pub use footprint::{Footprint, Footprints};
 pub use forward::{Connected, connect};
 pub use specular::EyeCounts;
+pub use spread::Irradiance;
 
 use crate::effort::Effort;
 use crate::film::{Film, PixelSums, RoundFilm};
@@ -51,12 +54,17 @@ pub fn trace_image(
     control: &Control,
 ) -> Result<(RoundFilm, EyeCounts), RenderError> {
     let image = context.scene.image;
+    let direct = context.photons.map(|photons| {
+        let half =
+            |i: usize| Irradiance::gather(&context.scene.camera, context.footprints, &photons.spreads[i]);
+        <[Irradiance; 2]>::from(rayon::join(|| half(0), || half(1)))
+    });
     let (across, down) = (image.width.div_ceil(TILE), image.height.div_ceil(TILE));
     let tiles = (0..across * down)
         .into_par_iter()
         .map(|tile| {
             control.check()?;
-            let traced = trace_tile(context, tile % across * TILE, tile / across * TILE);
+            let traced = trace_tile(context, direct.as_ref(), (tile % across * TILE, tile / across * TILE));
             control.tile_done(across * down);
             traced
         })
@@ -78,7 +86,11 @@ struct Tile {
     counts: EyeCounts,
 }
 
-fn trace_tile(context: &EyeContext<'_>, x: u32, y: u32) -> Result<Tile, RenderError> {
+fn trace_tile(
+    context: &EyeContext<'_>,
+    direct: Option<&[Irradiance; 2]>,
+    (x, y): (u32, u32),
+) -> Result<Tile, RenderError> {
     let image = context.scene.image;
     let (width, height) = (TILE.min(image.width - x), TILE.min(image.height - y));
     let mut walk = EyeWalk::new(context);
@@ -86,7 +98,7 @@ fn trace_tile(context: &EyeContext<'_>, x: u32, y: u32) -> Result<Tile, RenderEr
     for py in y..y + height {
         for px in x..x + width {
             let index = py as usize * image.width as usize + px as usize;
-            let sums = trace_pixel(context, &mut walk, (px, py), index);
+            let sums = trace_pixel((context, direct), &mut walk, (px, py), index);
             if let Some(class) = sums.not_finite() {
                 return Err(RenderError::NotFinite { x: px, y: py, round: context.round, class });
             }
@@ -99,7 +111,7 @@ fn trace_tile(context: &EyeContext<'_>, x: u32, y: u32) -> Result<Tile, RenderEr
 /// One pixel's samples of this round in both halves. Photons are counted on the pixel's footprint; the eye
 /// samples look up what the footprint does not show, at the end of side branches or where there is no footprint.
 fn trace_pixel(
-    context: &EyeContext<'_>,
+    (context, direct): (&EyeContext<'_>, Option<&[Irradiance; 2]>),
     walk: &mut EyeWalk<'_>,
     (x, y): (u32, u32),
     index: usize,
@@ -118,9 +130,13 @@ fn trace_pixel(
     let mut sums = PixelSums { samples: count, ..PixelSums::default() };
     for half in 0..2 {
         if let (Some(footprint), Some(photons)) = (footprint, context.photons) {
-            walk.counts.lookups += 1;
-            let flux = photons.maps[half as usize].flux_within(footprint);
-            sums.halves[half as usize].irradiance = flux / footprint.area;
+            sums.halves[half as usize].irradiance = match direct.filter(|_| footprint.direct) {
+                Some(direct) => direct[half as usize].get(index),
+                None => {
+                    walk.counts.lookups += 1;
+                    photons.maps[half as usize].flux_within(footprint) / footprint.area
+                }
+            };
         }
         let seed = pixel_seed(context.scene.render.seed, x, y, half);
         for i in 0..count {

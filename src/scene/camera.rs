@@ -172,6 +172,25 @@ impl Camera {
         Vec2::new(ndc.x * half_height * aspect, -ndc.y * half_height)
     }
 
+    /// The raster position that shows a point: the inverse of [`Camera::ray`]. `None` for what is not in front of
+    /// the camera.
+    #[inline]
+    #[must_use]
+    pub fn raster(&self, point: Vec3) -> Option<Vec2> {
+        let to = point - self.eye;
+        let depth = to.dot(self.forward);
+        if depth <= 0.0 {
+            return None;
+        }
+        let scale = match self.projection {
+            Projection::Perspective { tan_half_fov, .. } => 1.0 / (depth * tan_half_fov),
+            Projection::Orthographic { height } => 2.0 / height,
+        };
+        let aspect = self.resolution.x / self.resolution.y;
+        let ndc = Vec2::new(to.dot(self.right) * scale / aspect, -to.dot(self.up) * scale);
+        Some((ndc + 1.0) * 0.5 * self.resolution)
+    }
+
     /// Width of a pixel at a distance from the eye.
     #[must_use]
     pub fn pixel_width(&self, distance: f32) -> f32 {

@@ -17,6 +17,7 @@ mod geometry_structures;
 mod glb;
 mod import;
 mod invariance;
+mod light_images;
 mod light_sampling;
 mod lights;
 mod materials;

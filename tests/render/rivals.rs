@@ -218,7 +218,14 @@ fn f69_forward_tracing_stays_right_with_the_eye_close_to_the_floor() {
         json!({ "type": "perspective", "eye": [-0.8, 2e-2, -0.2], "target": [-0.9, 0, -0.2], "fov": 10 });
     let [map, forward] = ["photons", "forward"].map(|estimator| {
         value["render"]["caustics"] = json!(estimator);
-        render(&value, 1, 1, 17).raw_layer(PathClass::Caustic)
+        let scene = std::sync::Arc::new(compile(&value));
+        let mut plan = nephroid::plan::Plan::new(&scene);
+        for budget in &mut plan.photons {
+            (budget.log2_block, budget.carries) = (17, nephroid::pass1_light::Carries::Points);
+        }
+        let mut render = nephroid::render::Render::new(scene, plan);
+        render.run_round(&nephroid::render::Control::new()).unwrap();
+        render.raw_layer(PathClass::Caustic)
     });
     let off: f32 = map.pixels.iter().zip(&forward.pixels).map(|(a, b)| (a[1] - b[1]).abs()).sum();
     let all: f32 = map.pixels.iter().map(|p| p[1]).sum();
