@@ -1,4 +1,4 @@
-.PHONY: serve test bench browser gallery
+.PHONY: serve test bench browser gallery openapi crash load fuzz
 
 # Builds and starts the service on http://127.0.0.1:8080; settings as flags, e.g. `make serve ARGS="--threads 4"`.
 serve:
@@ -21,3 +21,21 @@ browser:
 # Every sample scene as a picture, and the page docs/gallery/README.md.
 gallery:
 	cargo run --release --example gallery -- $(SCENES)
+
+# The document of the service's addresses, after they have changed.
+openapi:
+	cargo run --package nephroid-api -- openapi > api/openapi.json.new && mv api/openapi.json.new api/openapi.json
+
+# Kills the service 200 times under load; nothing is lost, nothing done twice, the bytes are the same.
+crash:
+	NEPHROID_TEST_KILLS=$(or $(KILLS),200) cargo test --package nephroid-api --test http -- kill:: --nocapture
+
+# How many requests a second the service answers, on loopback (needs wrk: apt-get install wrk).
+load:
+	cargo build --release --package nephroid-api --package nephroid --bins
+	bash tests/load/run.sh
+
+# Random requests made from the OpenAPI document (needs schemathesis: pip install schemathesis).
+fuzz:
+	cargo build --release --package nephroid-api --bins
+	bash tests/load/fuzz.sh

@@ -1,15 +1,17 @@
 //! The joint to the renderer: the only file that names the `nephroid` crate.
 
-use crate::samples;
+use crate::{error_map, samples};
+use nephroid::film::Film;
 use nephroid::image_io::{encode_exr, encode_png};
 use nephroid::plan::Plan;
 use nephroid::render::{Render, RenderError};
 use nephroid::report;
 use nephroid::scene::assets::{AssetError, AssetSource};
-use nephroid::scene::{ImageSettings, Scene, SceneIssue};
+use nephroid::scene::{ImageSettings, Scene, SceneIssue, Tone};
 use serde_json::Value;
 use std::borrow::Cow;
-use std::sync::Arc;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, PoisonError};
 
 pub use nephroid::image_io::LinearImage;
 pub use nephroid::render::Control;
@@ -33,18 +35,42 @@ pub struct LoadedScene {
     scene: Arc<Scene>,
     /// The longest rendering time that the scene itself asks for.
     pub asked_seconds: Option<f64>,
+    /// What it refers to, of the files that it was given.
+    pub assets: Vec<String>,
 }
 
 impl LoadedScene {
-    /// Reads and checks a scene; on failure everything that is wrong with it. However it asks to end,
-    /// it ends after `max_seconds` of rendering.
-    pub fn read(text: &str, max_seconds: f64) -> Result<Self, Vec<Issue>> {
-        let read = Scene::from_json(text, &SampleAssets);
+    /// Reads and checks a scene that may refer to these files; on failure everything that is wrong with it.
+    /// However it asks to end, it ends after `max_seconds` of rendering.
+    pub fn read(text: &str, files: &dyn SceneFiles, max_seconds: f64) -> Result<Self, Vec<Issue>> {
+        let assets = Assets { files, used: Mutex::default() };
+        let read = Scene::from_json(text, &assets);
         let mut scene = read.map_err(|errors| errors.issues.into_iter().map(issue_of).collect::<Vec<_>>())?;
         let stop = &mut scene.render.stop;
         let asked_seconds = stop.seconds;
         stop.seconds = Some(asked_seconds.map_or(max_seconds, |asked| asked.min(max_seconds)));
-        Ok(Self { scene: Arc::new(scene), asked_seconds })
+        let assets = assets.used.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(Self { scene: Arc::new(scene), asked_seconds, assets: assets.into_iter().collect() })
+    }
+
+    /// Surfaces that rays are held against, triangles of meshes each by itself.
+    #[must_use]
+    pub fn primitives(&self) -> usize {
+        self.scene.geometry.primitive_count()
+    }
+
+    /// Lamps, shining objects among them.
+    #[must_use]
+    pub fn lights(&self) -> usize {
+        self.scene.lights.len()
+    }
+
+    /// Memory that its render needs at the least: known without a plan.
+    #[must_use]
+    pub fn least_memory_bytes(&self) -> u64 {
+        let [width, height] = self.size();
+        let scene = self.scene.geometry.memory_bytes() + self.scene.image_bytes;
+        Film::bytes(width, height).saturating_add(scene)
     }
 
     /// The scene's own name.
@@ -72,12 +98,41 @@ pub fn scene_schema() -> Value {
     nephroid::scene::schema()
 }
 
-/// The files that come with the samples.
-struct SampleAssets;
+/// Files that a scene may refer to, beside those of the samples.
+pub trait SceneFiles: Send + Sync {
+    /// Reads a file; `None` if there is none of this name.
+    ///
+    /// # Errors
+    /// If it is there and cannot be read: why, in words for the client.
+    fn read(&self, name: &str) -> Result<Option<Vec<u8>>, String>;
+}
 
-impl AssetSource for SampleAssets {
+/// No files but those of the samples.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleFiles;
+
+impl SceneFiles for SampleFiles {
+    fn read(&self, _name: &str) -> Result<Option<Vec<u8>>, String> {
+        Ok(None)
+    }
+}
+
+/// The files of the samples and those given, and which of the latter were read.
+struct Assets<'a> {
+    files: &'a dyn SceneFiles,
+    used: Mutex<BTreeSet<String>>,
+}
+
+impl AssetSource for Assets<'_> {
     fn read(&self, name: &str) -> Result<Cow<'_, [u8]>, AssetError> {
-        samples::asset(name).map(Cow::Borrowed).ok_or_else(|| AssetError::NotFound(name.to_owned()))
+        if let Some(sample) = samples::asset(name) {
+            return Ok(Cow::Borrowed(sample));
+        }
+        let unreadable = |reason| AssetError::Unreadable { name: name.to_owned(), reason };
+        let bytes = self.files.read(name).map_err(unreadable)?;
+        let bytes = bytes.ok_or_else(|| AssetError::NotFound(name.to_owned()))?;
+        self.used.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned());
+        Ok(Cow::Owned(bytes))
     }
 }
 
@@ -104,6 +159,12 @@ impl PlannedScene {
     #[must_use]
     pub fn memory_bytes(&self) -> u64 {
         self.plan.memory_bytes
+    }
+
+    /// Photons that a round sends.
+    #[must_use]
+    pub fn photons_per_round(&self) -> u64 {
+        self.plan.photons.iter().map(|budget| 2_u64 << budget.log2_block).sum()
     }
 
     /// Begins the render, from a checkpoint if there is one that fits.
@@ -135,6 +196,17 @@ pub enum RoundError {
         /// One sentence.
         detail: String,
     },
+}
+
+/// What a render has cost so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Work {
+    /// Photons sent.
+    pub photons: u64,
+    /// Rays traced, of photons and of the eye.
+    pub rays: u64,
+    /// Seconds by the clock in pass 1 and pass 2.
+    pub pass_seconds: [f64; 2],
 }
 
 /// A picture that a finished render leaves.
@@ -212,6 +284,18 @@ impl RunningRender {
         report::stats_json(&self.render)
     }
 
+    /// What it has cost so far.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        let stats = self.render.stats();
+        let photon_rays: u64 = stats.windows.iter().map(|tally| tally.rays).sum();
+        Work {
+            photons: stats.windows.iter().map(|tally| tally.sent).sum(),
+            rays: photon_rays + stats.eye.eye_rays + stats.eye.shadow_rays,
+            pass_seconds: [stats.pass1.wall, stats.pass2.wall],
+        }
+    }
+
     /// The pictures of a finished render.
     pub fn outputs(&self) -> Result<Vec<Output>, String> {
         let picture = self.render.picture();
@@ -227,7 +311,18 @@ impl RunningRender {
             let bytes = self.png(&picture.layer(class))?;
             outputs.push(Output { name: format!("layers/{}.png", class.name()), bytes });
         }
+        outputs.push(Output { name: "error.png".into(), bytes: self.error_map(&picture)? });
         Ok(outputs)
+    }
+
+    /// The estimated error of each pixel, as colours.
+    fn error_map(&self, picture: &nephroid::picture::Picture<'_>) -> Result<Vec<u8>, String> {
+        let errors = picture.errors();
+        let pixels =
+            errors.iter().map(|error| error_map::color((error.sampled + error.photons).sqrt())).collect();
+        let ImageSettings { width, height, .. } = self.settings;
+        let settings = ImageSettings { width, height, exposure: 0.0, tone: Tone::Linear };
+        encode_png(&LinearImage { width, height, pixels }, &settings).map_err(|error| error.to_string())
     }
 
     fn png(&self, image: &LinearImage) -> Result<Vec<u8>, String> {
@@ -258,7 +353,7 @@ mod tests {
         let mut scene: Value = serde_json::from_str(sample.text).expect("it is JSON");
         scene["image"]["width"] = 32.into();
         scene["image"]["height"] = 24.into();
-        let scene = LoadedScene::read(&scene.to_string(), 60.0).expect("it is a scene");
+        let scene = LoadedScene::read(&scene.to_string(), &SampleFiles, 60.0).expect("it is a scene");
         scene.plan().begin(checkpoint)
     }
 

@@ -2,39 +2,46 @@
 //!
 //! Read in this order:
 //! - [`routes`]: every address on one screen; handlers convert, call and convert.
-//! - [`wire`] and [`problem`]: what goes out, [`body`]: what comes in.
+//! - [`wire`] and [`problem`]: what goes out, [`body`]: what comes in; [`openapi`]: both, as a document.
+//! - `access`: who is asking. `request`: what happens to every request. [`serve()`]: connections.
 //! - [`jobs`]: the database, the files and the thread that renders.
-//! - [`engine`]: the joint to the renderer. [`samples`]: the embedded scenes. [`config`]: all settings.
+//! - [`engine`]: the joint to the renderer; `error_map` and `chart`: its error as pictures. `metrics`: numbers.
+//! - [`samples`]: the embedded scenes. [`config`]: all settings.
 
+mod access;
 pub mod body;
+mod chart;
 pub mod config;
 pub mod engine;
+mod error_map;
 pub mod jobs;
+mod metrics;
+pub mod openapi;
 mod planner;
 pub mod problem;
+mod request;
 pub mod routes;
 pub mod samples;
+mod serve;
 pub mod wire;
 
 pub use routes::router;
+pub use serve::serve;
 
+use access::Rates;
 use config::Settings;
 use jobs::service::{Jobs, OpenError};
+use metrics::Metrics;
 use planner::Planner;
-use std::future::Future;
-use std::io;
 use std::sync::Arc;
-use std::time::Duration;
-use tokio::net::TcpListener;
-
-/// How long open connections may finish their answers after the jobs are put aside.
-const LAST_ANSWERS: Duration = Duration::from_secs(3);
 
 /// What all handlers share.
 #[derive(Clone, Debug)]
 pub struct AppState {
     pub(crate) jobs: Arc<Jobs>,
     pub(crate) planner: Planner,
+    pub(crate) metrics: Arc<Metrics>,
+    pub(crate) rates: Arc<Rates>,
     pub(crate) settings: Arc<Settings>,
 }
 
@@ -45,38 +52,9 @@ impl AppState {
     /// # Errors
     /// If the data folder, the database or the render threads cannot be used.
     pub fn open(settings: Settings) -> Result<Self, OpenError> {
-        let jobs = Arc::new(Jobs::open(&settings)?);
-        Ok(Self { jobs, planner: Planner::new(&settings)?, settings: Arc::new(settings) })
-    }
-}
-
-/// Serves until `shutdown`; then takes no more jobs, puts aside what runs and finishes its answers.
-///
-/// # Errors
-/// If the listener fails.
-pub async fn serve(
-    listener: TcpListener,
-    state: AppState,
-    shutdown: impl Future<Output = ()> + Send + 'static,
-) -> io::Result<()> {
-    let (drained, mut is_drained) = tokio::sync::watch::channel(false);
-    let jobs = Arc::clone(&state.jobs);
-    // While it drains, the service still answers: not ready, no new jobs.
-    let drain = async move {
-        shutdown.await;
-        tracing::info!("draining");
-        jobs.drain().await;
-        drained.send_replace(true);
-    };
-    let server = axum::serve(listener, router(state)).with_graceful_shutdown(drain);
-    let give_up = async {
-        // An error means that the server, and with it the sender, has gone.
-        if is_drained.wait_for(|drained| *drained).await.is_ok() {
-            tokio::time::sleep(LAST_ANSWERS).await;
-        }
-    };
-    tokio::select! {
-        ended = server => ended,
-        () = give_up => Ok(()),
+        let (settings, metrics) = (Arc::new(settings), Arc::<Metrics>::default());
+        let jobs = Arc::new(Jobs::open(&settings, Arc::clone(&metrics))?);
+        let planner = Planner::new(Arc::clone(&settings))?;
+        Ok(Self { jobs, planner, metrics, rates: Arc::new(Rates::new(&settings)), settings })
     }
 }

@@ -1,8 +1,9 @@
-//! The command `nephroid-api`: read the settings, bind, serve until a signal.
+//! The command `nephroid-api`: read the settings, bind, serve until a signal; or make and revoke keys.
 
 use clap::Parser;
 use nephroid_api::AppState;
-use nephroid_api::config::{Cli, Settings};
+use nephroid_api::config::{Cli, Command, KeyAction, LogFormat, Settings};
+use nephroid_api::jobs::KeyAdmin;
 use std::error::Error;
 use std::io::{IsTerminal, Write};
 use std::net::TcpListener;
@@ -10,25 +11,30 @@ use std::process::ExitCode;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 
+/// The service must not be started like this.
+const REFUSED: u8 = 2;
+
 fn main() -> ExitCode {
-    let settings = Cli::parse().into_settings();
-    if let Some(refusal) = settings.refusal() {
-        eprintln!("nephroid-api: {refusal}");
-        return ExitCode::from(2);
-    }
-    let filter = EnvFilter::try_from_env("NEPHROID_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
-    let ansi = std::io::stderr().is_terminal();
-    tracing_subscriber::fmt().with_env_filter(filter).with_ansi(ansi).with_writer(std::io::stderr).init();
-    match run(settings) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("nephroid-api: {error}");
-            ExitCode::FAILURE
+    let done = match Cli::parse().into_command() {
+        Command::Serve(settings) => serve(*settings),
+        Command::Keys { data, action } => {
+            KeyAdmin::open(&data).map_err(Into::into).and_then(|keys| manage(&keys, action))
         }
-    }
+        Command::Openapi => print(&nephroid_api::openapi::text()),
+    };
+    done.unwrap_or_else(|error| {
+        eprintln!("nephroid-api: {error}");
+        ExitCode::FAILURE
+    })
 }
 
-fn run(settings: Settings) -> Result<(), Box<dyn Error>> {
+fn serve(settings: Settings) -> Result<ExitCode, Box<dyn Error>> {
+    let has_keys = KeyAdmin::open(&settings.data)?.list()?.iter().any(|key| key.revoked_ms.is_none());
+    if let Some(refusal) = settings.refusal(has_keys) {
+        eprintln!("nephroid-api: {refusal}");
+        return Ok(ExitCode::from(REFUSED));
+    }
+    start_log(settings.log_format);
     let listener = TcpListener::bind(settings.listen)
         .map_err(|error| format!("cannot listen on {}: {error}", settings.listen))?;
     listener.set_nonblocking(true)?;
@@ -36,11 +42,44 @@ fn run(settings: Settings) -> Result<(), Box<dyn Error>> {
     // Before rendering starts, so that a signal from then on puts the jobs aside.
     let shutdown = runtime.block_on(async { stop_signal() })?;
     let state = AppState::open(settings)?;
-    let mut stdout = std::io::stdout();
-    writeln!(stdout, "listening on http://{}", listener.local_addr()?)?;
-    stdout.flush()?;
+    print(&format!("listening on http://{}\n", listener.local_addr()?))?;
     runtime.block_on(async { nephroid_api::serve(listener.try_into()?, state, shutdown).await })?;
-    Ok(())
+    Ok(ExitCode::SUCCESS)
+}
+
+fn start_log(format: LogFormat) {
+    let filter = EnvFilter::try_from_env("NEPHROID_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    match format {
+        LogFormat::Text => log.with_ansi(std::io::stderr().is_terminal()).init(),
+        LogFormat::Json => log.json().init(),
+    }
+}
+
+fn manage(keys: &KeyAdmin, action: KeyAction) -> Result<ExitCode, Box<dyn Error>> {
+    match action {
+        KeyAction::Add { name } => print(&format!("{}\n", keys.add(&name)?)),
+        KeyAction::List => {
+            for key in keys.list()? {
+                let state = if key.revoked_ms.is_some() { "revoked" } else { "active" };
+                print(&format!("{}  {state:7}  {}\n", key.id, key.name))?;
+            }
+            Ok(ExitCode::SUCCESS)
+        }
+        KeyAction::Revoke { id } => {
+            if keys.revoke(&id)? {
+                return Ok(ExitCode::SUCCESS);
+            }
+            Err(format!("there is no key {id} in force").into())
+        }
+    }
+}
+
+fn print(text: &str) -> Result<ExitCode, Box<dyn Error>> {
+    let mut stdout = std::io::stdout();
+    stdout.write_all(text.as_bytes())?;
+    stdout.flush()?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Completes when the process is asked to end.

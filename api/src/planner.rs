@@ -1,9 +1,9 @@
 //! Reads and plans scenes for requests: beside the render thread, never on the I/O threads.
 
 use crate::config::Settings;
-use crate::engine::{LoadedScene, PlannedScene};
+use crate::engine::{LoadedScene, PlannedScene, SceneFiles};
 use crate::problem::Problem;
-use serde_json::json;
+use serde_json::Value;
 use std::sync::Arc;
 use tokio::sync::Semaphore;
 
@@ -15,56 +15,58 @@ const AT_ONCE: usize = 2;
 pub(crate) struct Planner {
     turns: Arc<Semaphore>,
     pool: Arc<rayon::ThreadPool>,
-    max_pixels: u64,
-    max_seconds: f64,
-    max_memory: u64,
+    settings: Arc<Settings>,
 }
 
 impl Planner {
-    pub(crate) fn new(settings: &Settings) -> Result<Self, rayon::ThreadPoolBuildError> {
+    pub(crate) fn new(settings: Arc<Settings>) -> Result<Self, rayon::ThreadPoolBuildError> {
         // One thread: plans are small, and the cores belong to the renders.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).thread_name(|_| "plan".into()).build()?;
-        Ok(Self {
-            turns: Arc::new(Semaphore::new(AT_ONCE)),
-            pool: Arc::new(pool),
-            max_pixels: settings.max_pixels,
-            max_seconds: settings.max_seconds,
-            max_memory: settings.max_memory as u64,
-        })
+        Ok(Self { turns: Arc::new(Semaphore::new(AT_ONCE)), pool: Arc::new(pool), settings })
     }
 
     /// Reads a scene and holds it against the limits of a job; gives the text back with it.
-    pub(crate) async fn read(&self, text: String) -> Result<(String, LoadedScene), Problem> {
+    pub(crate) async fn read<F>(&self, text: String, files: F) -> Result<(String, LoadedScene), Problem>
+    where
+        F: SceneFiles + 'static,
+    {
         let planner = self.clone();
-        self.run(move || planner.read_now(&text).map(|scene| (text, scene))).await
+        self.run(move || planner.read_now(&text, &files).map(|scene| (text, scene))).await
     }
 
     /// Reads a scene and plans it.
-    pub(crate) async fn plan(&self, text: String) -> Result<PlannedScene, Problem> {
+    pub(crate) async fn plan<F>(&self, text: String, files: F) -> Result<PlannedScene, Problem>
+    where
+        F: SceneFiles + 'static,
+    {
         let planner = self.clone();
         let work = move || {
-            let scene = planner.read_now(&text)?;
+            let scene = planner.read_now(&text, &files)?;
             let planned = planner.pool.install(|| scene.plan());
-            let (needed, limit) = (planned.memory_bytes(), planner.max_memory);
-            if needed > limit {
-                return Err(Problem::over_limit("/image", json!(needed), json!(limit), "bytes of memory"));
-            }
+            let (needed, limit) = (planned.memory_bytes(), planner.settings.max_memory as u64);
+            within("/image", needed, limit, "bytes of memory")?;
+            within(
+                "/render",
+                planned.photons_per_round(),
+                planner.settings.max_photons,
+                "photons per round",
+            )?;
             Ok(planned)
         };
         self.run(work).await
     }
 
-    fn read_now(&self, text: &str) -> Result<LoadedScene, Problem> {
-        let scene =
-            LoadedScene::read(text, self.max_seconds).map_err(|issues| Problem::bad_scene(&issues))?;
+    fn read_now(&self, text: &str, files: &dyn SceneFiles) -> Result<LoadedScene, Problem> {
+        let limits = &self.settings;
+        let scene = LoadedScene::read(text, files, limits.max_seconds)
+            .map_err(|issues| Problem::bad_scene(&issues))?;
         let [width, height] = scene.size().map(u64::from);
-        if width * height > self.max_pixels {
-            let (asked, limit) = (json!(width * height), json!(self.max_pixels));
-            return Err(Problem::over_limit("/image", asked, limit, "pixels"));
-        }
-        if let Some(asked) = scene.asked_seconds.filter(|&asked| asked > self.max_seconds) {
-            let (asked, limit) = (json!(asked), json!(self.max_seconds));
-            return Err(Problem::over_limit("/render/stop/seconds", asked, limit, "seconds"));
+        within("/image", width * height, limits.max_pixels, "pixels")?;
+        within("/objects", scene.primitives(), limits.max_primitives, "primitives")?;
+        within("/lights", scene.lights(), limits.max_lights, "lights")?;
+        within("/image", scene.least_memory_bytes(), limits.max_memory as u64, "bytes of memory")?;
+        if let Some(asked) = scene.asked_seconds {
+            within("/render/stop/seconds", asked, limits.max_seconds, "seconds")?;
         }
         Ok(scene)
     }
@@ -77,4 +79,11 @@ impl Planner {
         let _turn = self.turns.acquire().await.map_err(Problem::internal)?;
         tokio::task::spawn_blocking(work).await.map_err(Problem::internal)?
     }
+}
+
+fn within<T>(pointer: &str, asked: T, limit: T, what: &str) -> Result<(), Problem>
+where
+    T: PartialOrd + Into<Value>,
+{
+    if asked > limit { Err(Problem::over_limit(pointer, asked.into(), limit.into(), what)) } else { Ok(()) }
 }

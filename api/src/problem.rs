@@ -10,6 +10,10 @@ use std::fmt::Display;
 /// Seconds after which a full queue is worth another try.
 const QUEUE_RETRY_S: u32 = 5;
 
+/// The code of a problem, left in the answer for whoever counts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ProblemCode(pub(crate) &'static str);
+
 /// An error as the client reads it. Internal text goes to the log, never in here.
 #[derive(Debug)]
 pub struct Problem {
@@ -48,6 +52,11 @@ impl Problem {
         Self::new(StatusCode::BAD_REQUEST, "not_utf8", "The body is not UTF-8", detail)
     }
 
+    /// 401: a key is needed, or this one is none.
+    pub fn unauthorized(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNAUTHORIZED, "unauthorized", "An API key is needed", detail)
+    }
+
     /// 404: there is nothing here.
     pub fn not_found(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, "not_found", "Not found", detail)
@@ -75,6 +84,13 @@ impl Problem {
             .with("state", state.as_str())
             .with("done", state.is_done());
         if state.is_done() { problem } else { problem.retry_after(1) }
+    }
+
+    /// 410: there was a job, and its time is over.
+    #[must_use]
+    pub fn expired() -> Self {
+        let detail = "The job was done, was kept as long as this service keeps jobs, and is forgotten now.";
+        Self::new(StatusCode::GONE, "expired", "The job has expired", detail)
     }
 
     /// 413: the body is larger than the service takes.
@@ -120,6 +136,23 @@ impl Problem {
             .with("errors", vec![error])
     }
 
+    /// 422: an asset's content is another than its name.
+    #[must_use]
+    pub fn asset_mismatch(actual: &str) -> Self {
+        let detail = format!("The SHA-256 of what came is {actual}.");
+        let title = "The content is not what its name says";
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "asset_mismatch", title, detail).with("sha256", actual)
+    }
+
+    /// 429: too many requests in too short a time.
+    #[must_use]
+    pub fn rate_limited(seconds: u32, limit: u32) -> Self {
+        let detail = format!("More than {limit} requests per second came; try again in {seconds} s.");
+        Self::new(StatusCode::TOO_MANY_REQUESTS, "rate_limited", "Too many requests", detail)
+            .with("limit", limit)
+            .retry_after(seconds)
+    }
+
     /// 503: the service is about to stop.
     #[must_use]
     pub fn draining() -> Self {
@@ -157,6 +190,22 @@ impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         match error {
             StoreError::NotFound => Self::not_found("There is no job of this name."),
+            StoreError::Expired => Self::expired(),
+            StoreError::TooManyJobs(limit) => Self::new(
+                StatusCode::TOO_MANY_REQUESTS,
+                "too_many_jobs",
+                "Too many unfinished jobs",
+                format!("{limit} jobs of this key are unfinished; wait for one, or cancel one."),
+            )
+            .retry_after(QUEUE_RETRY_S)
+            .with("limit", limit),
+            StoreError::StorageFull => Self::new(
+                StatusCode::INSUFFICIENT_STORAGE,
+                "storage_full",
+                "The disk is full",
+                "The service has no room for more; what it has is kept and can be fetched.",
+            )
+            .retry_after(30),
             StoreError::QueueFull(waiting) => Self::new(
                 StatusCode::TOO_MANY_REQUESTS,
                 "queue_full",
@@ -174,6 +223,7 @@ impl From<StoreError> for Problem {
             error @ (StoreError::IllegalMove(_)
             | StoreError::StaleAttempt
             | StoreError::NotCommitted
+            | StoreError::Newer
             | StoreError::Sqlite(_)) => Self::internal(error),
         }
     }
@@ -199,6 +249,10 @@ impl IntoResponse for Problem {
         if let Some(seconds) = self.retry_after_s {
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
+        if self.status == StatusCode::UNAUTHORIZED {
+            response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
+        response.extensions_mut().insert(ProblemCode(self.code));
         response
     }
 }

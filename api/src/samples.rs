@@ -55,13 +55,13 @@ pub fn asset(name: &str) -> Option<&'static [u8]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::LoadedScene;
+    use crate::engine::{LoadedScene, SampleFiles};
 
     #[test]
     fn every_sample_can_be_rendered_and_has_a_picture() {
         assert!(find("glass-ball").is_some());
         for sample in all() {
-            let read = LoadedScene::read(sample.text, 60.0);
+            let read = LoadedScene::read(sample.text, &SampleFiles, 60.0);
             assert!(read.is_ok(), "{}: {:?}", sample.name, read.err());
             assert!(sample.picture().is_some(), "{} has no picture in docs/gallery", sample.name);
         }

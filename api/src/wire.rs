@@ -1,39 +1,70 @@
 //! What jobs, lists and samples look like in JSON. Inner types are never serialised themselves.
 
 use crate::jobs::service::Status;
-use crate::jobs::{Job, JobState};
+use crate::jobs::{Job, JobState, Milestone, Phase};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use utoipa::{IntoParams, ToSchema};
 
-/// A job as clients see it.
-#[derive(Debug, Serialize)]
+/// A render: a scene, what became of it, and where its pictures are.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Render)]
 pub struct JobView {
+    #[schema(format = Uuid)]
     id: String,
-    state: &'static str,
+    state: JobState,
     /// True once nothing will change any more.
     done: bool,
+    /// What is being done while it runs.
+    phase: Option<Phase>,
+    /// The scene's name.
     name: String,
+    /// What its owner called it in `?label=`.
+    label: Option<String>,
     width: u32,
     height: u32,
+    /// From 0 to 1, a guess from the rule that will end the render.
     progress: f32,
+    /// Rounds that are finished.
     rounds: u32,
+    /// Estimated relative error of the picture.
     error_estimate: Option<f32>,
+    /// Which limit ended the render: `error`, `seconds` or `rounds`.
     stop_reason: Option<String>,
+    /// How many jobs wait before it, counted up to 1000.
     queue_position: Option<u32>,
+    /// How often it was started.
     attempt: u32,
+    #[schema(format = DateTime)]
     created_at: String,
+    #[schema(format = DateTime)]
     started_at: Option<String>,
+    #[schema(format = DateTime)]
     finished_at: Option<String>,
+    /// When it will be forgotten with its pictures.
+    #[schema(format = DateTime)]
+    expires_at: Option<String>,
+    /// Estimated error against time, so far.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(required = false)]
+    history: Option<Vec<Milestone>>,
+    /// What runs, what is left out, and why.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(required = false, value_type = Option<Plan>)]
     plan: Option<Value>,
+    /// Time per pass, photons per light, rays.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(required = false, value_type = Option<Object>)]
     stats: Option<Value>,
     error: Option<FailureView>,
+    /// Addresses of what there is of it by now.
     links: BTreeMap<String, String>,
 }
 
-#[derive(Debug, Serialize)]
+/// Why a render failed.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Failure)]
 struct FailureView {
     code: String,
     detail: String,
@@ -43,15 +74,17 @@ impl JobView {
     /// The job in full.
     #[must_use]
     pub fn full(status: Status) -> Self {
-        let Status { job, progress, queue_position } = status;
+        let Status { job, expires_ms, progress, queue_position } = status;
         let links = links_of(&job);
         let known = progress.unwrap_or_default();
         let fraction = if job.state == JobState::Succeeded { 1.0 } else { known.fraction };
         Self {
             id: job.id.to_string(),
-            state: job.state.as_str(),
+            state: job.state,
             done: job.state.is_done(),
+            phase: progress.map(|progress| progress.phase),
             name: job.name,
+            label: job.label,
             width: job.size[0],
             height: job.size[1],
             progress: fraction,
@@ -63,6 +96,8 @@ impl JobView {
             created_at: rfc3339(job.created_ms),
             started_at: job.started_ms.map(rfc3339),
             finished_at: job.finished_ms.map(rfc3339),
+            expires_at: expires_ms.map(rfc3339),
+            history: Some(job.history),
             plan: job.plan,
             stats: job.stats,
             error: job.failure.map(|failure| FailureView { code: failure.code, detail: failure.detail }),
@@ -70,12 +105,12 @@ impl JobView {
         }
     }
 
-    /// The job as a line of a list: without plan and stats.
+    /// The job as a line of a list or an event: without plan, stats and history.
     #[must_use]
     pub fn brief(mut status: Status) -> Self {
         status.job.plan = None;
         status.job.stats = None;
-        Self::full(status)
+        Self { history: None, ..Self::full(status) }
     }
 }
 
@@ -87,57 +122,120 @@ pub fn job_path(id: impl std::fmt::Display) -> String {
 
 fn links_of(job: &Job) -> BTreeMap<String, String> {
     let base = job_path(job.id);
-    let scene = format!("{base}/scene.json");
-    let mut links = BTreeMap::from([("self".to_owned(), base.clone()), ("scene".to_owned(), scene)]);
+    let mut links = BTreeMap::from([("self".to_owned(), base.clone())]);
+    let mut link = |name: &str, path: &str| links.insert(name.into(), format!("{base}/{path}"));
+    link("scene", "scene.json");
+    link("events", "events");
+    link("chart", "chart.svg");
     if !job.state.is_done() {
-        links.insert("cancel".into(), format!("{base}/cancel"));
-        links.insert("preview".into(), format!("{base}/preview.png"));
+        link("cancel", "cancel");
+        link("preview", "preview.png");
     }
     if job.state == JobState::Succeeded {
-        links.insert("image".into(), format!("{base}/image.png"));
-        links.insert("exr".into(), format!("{base}/image.exr"));
+        link("image", "image.png");
+        link("exr", "image.exr");
     }
     for artifact in &job.artifacts {
-        if let Some(class) = artifact.name.strip_prefix("layers/") {
-            let class = class.trim_end_matches(".png");
-            links.insert(format!("layer_{class}"), format!("{base}/{}", artifact.name));
+        if artifact.name == "error.png" {
+            link("error", &artifact.name);
+        } else if let Some(class) = artifact.name.strip_prefix("layers/") {
+            link(&format!("layer_{}", class.trim_end_matches(".png")), &artifact.name);
         }
     }
     links
 }
 
 /// A page of jobs.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = RenderList)]
 pub struct JobList {
-    /// Newest first.
+    /// Newest first; without plan, stats and history.
     pub renders: Vec<JobView>,
     /// What to send as `cursor` for the next page; none on the last.
     pub next_cursor: Option<String>,
 }
 
 /// The query of a list.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub struct ListQuery {
     /// Only jobs in this state.
     pub state: Option<JobState>,
-    /// Where the last page ended.
+    /// Only jobs with this label.
+    pub label: Option<String>,
+    /// Where the last page ended: its `next_cursor`.
+    #[param(pattern = "^[0-9a-f]{1,15}$")]
     pub cursor: Option<String>,
     /// Jobs per page.
+    #[param(minimum = 1, maximum = 100, default = 20)]
     pub limit: Option<u32>,
 }
 
 /// The query of a submission.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub struct CreateQuery {
     /// Only say whether the scene is valid, and what would be done.
     #[serde(default)]
+    #[param(required = false)]
     pub validate_only: bool,
+    /// The client's own name for the job; need not be unique.
+    #[param(max_length = 200)]
+    pub label: Option<String>,
+}
+
+/// What would run for a scene, what is left out, and why.
+#[derive(Debug, ToSchema)]
+pub struct Plan {
+    /// One for every choice that the renderer makes.
+    pub decisions: Vec<Decision>,
+    /// What is allowed, but hardly meant.
+    pub warnings: Vec<Warning>,
+    /// Pairs of a light and an object that photons are sent for.
+    pub windows: Vec<Value>,
+    /// Memory that the render will need.
+    pub memory_bytes: u64,
+}
+
+/// One choice of the renderer.
+#[derive(Debug, ToSchema)]
+pub struct Decision {
+    /// What it is about.
+    pub topic: String,
+    /// False if it is left out.
+    pub runs: bool,
+    /// What was chosen.
+    pub choice: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// Something that is allowed, but hardly meant.
+#[derive(Debug, ToSchema)]
+pub struct Warning {
+    /// Stable name of what it is.
+    pub code: String,
+    /// JSON pointer to the place, if there is one.
+    pub pointer: Option<String>,
+    /// One sentence.
+    pub message: String,
+}
+
+/// The answer to a scene that was only to be validated.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Validated {
+    /// Always true: what is not valid is a problem.
+    pub valid: bool,
+    /// What would be done.
+    #[schema(value_type = Plan)]
+    pub plan: Value,
 }
 
 /// A sample scene in the list.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Sample)]
 pub struct SampleView {
     /// Its name in addresses.
     pub name: String,
@@ -147,6 +245,94 @@ pub struct SampleView {
     pub href: String,
     /// Where a small picture of it is.
     pub picture: Option<String>,
+}
+
+/// All sample scenes.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct SampleList {
+    /// By name.
+    pub scenes: Vec<SampleView>,
+}
+
+/// An asset that is there.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Asset {
+    /// Its name in scenes and addresses.
+    pub sha256: String,
+    /// Its size.
+    pub bytes: u64,
+}
+
+/// An API key, to be kept in a cookie of the web page.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SessionRequest {
+    /// The token.
+    pub key: String,
+}
+
+/// Whether this client may use the service.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Session {
+    /// True if requests need a key.
+    pub key_needed: bool,
+    /// True if this client's requests are served.
+    pub welcome: bool,
+}
+
+/// Health of the service.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Alive {
+    /// Always true.
+    pub alive: bool,
+    /// Version of the service.
+    pub version: String,
+}
+
+/// Readiness of the service.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Ready {
+    /// Always true: otherwise the answer is a problem.
+    pub ready: bool,
+}
+
+/// A problem in the sense of RFC 9457; some have more members.
+#[derive(Debug, ToSchema)]
+pub struct Problem {
+    /// `urn:nephroid:problem:` and the code.
+    #[schema(rename = "type")]
+    pub r#type: String,
+    /// The kind of problem in a few words.
+    pub title: String,
+    /// The status of the answer.
+    pub status: u16,
+    /// Stable name of the kind of problem.
+    pub code: String,
+    /// One sentence, for people.
+    pub detail: String,
+    /// Every place of a scene that is wrong.
+    #[schema(required = false)]
+    pub errors: Option<Vec<ProblemError>>,
+    /// Seconds after which it is worth trying again.
+    #[schema(required = false)]
+    pub retry_after: Option<u32>,
+}
+
+/// One thing that is wrong with a scene.
+#[derive(Debug, ToSchema)]
+pub struct ProblemError {
+    /// JSON pointer to the place.
+    pub pointer: String,
+    /// Stable name of what is wrong.
+    pub code: String,
+    /// One sentence.
+    pub detail: String,
+    /// Line in the text, from 1.
+    #[schema(required = false)]
+    pub line: Option<u64>,
+    /// Column in the line, from 1.
+    #[schema(required = false)]
+    pub column: Option<u64>,
 }
 
 /// Milliseconds since 1970 as `2026-11-23T08:30:00.000Z`.

@@ -1,20 +1,27 @@
 // The web page: pick or edit a scene, render it, watch, keep the picture.
 
 import { Nephroid } from "./nephroid.js";
+import { Editor } from "./editor.js";
+import { Layers } from "./layers.js";
 import { drawSketch } from "./sketch.js";
 import { drawErrorChart } from "./chart.js";
 import { RecentRenders, WORDS, make } from "./recent.js";
 
+/** A scene that rests this long is checked. */
+const CHECK_AFTER = 700;
+
 const nephroid = new Nephroid();
 const $ = (id) => document.getElementById(id);
 
+const editor = new Editor({ edited: sceneEdited, submit: submitScene });
+const layers = new Layers(nephroid, (url, words) => show(url, words));
 const recent = new RecentRenders(nephroid, {
   shown: () => following?.id,
   removed: (id) => id === following?.id && showScene(),
   failed: showProblem,
 });
 
-let following = null; // { id, stop, history }
+let following = null; // { id, stop }
 let chosen = null; // the sample in the editor, as long as it is not changed
 let shownUrl = null;
 
@@ -25,15 +32,32 @@ async function start() {
   $("plan").addEventListener("click", showPlan);
   $("cancel").addEventListener("click", () => following && nephroid.cancel(following.id).then(showJob, showProblem));
   $("reuse").addEventListener("click", reuseScene);
-  $("scene").addEventListener("input", sceneEdited);
-  $("scene").addEventListener("scroll", () => ($("gutter").scrollTop = $("scene").scrollTop));
-  $("scene").addEventListener("keydown", (event) => {
-    if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) submitScene();
-  });
+  $("key-form").addEventListener("submit", signIn);
   window.addEventListener("hashchange", followAddress);
+  await askForKey().catch(showProblem);
   recent.start();
+  nephroid.schema().then((schema) => (editor.schema = schema), () => {}); // without it there is no completion
   await loadSamples().catch(showProblem);
   followAddress();
+}
+
+/** Resolves once this client may use the service. */
+async function askForKey() {
+  const { welcome } = await nephroid.session();
+  if (welcome) return;
+  $("key-dialog").showModal();
+  await new Promise((resolve) => $("key-dialog").addEventListener("close", resolve, { once: true }));
+}
+
+async function signIn(event) {
+  event.preventDefault();
+  try {
+    await nephroid.signIn($("key").value.trim());
+    $("key-dialog").close();
+  } catch (error) {
+    $("key-problem").textContent = error.message;
+    $("key").focus();
+  }
 }
 
 // ---- the scene
@@ -43,7 +67,7 @@ async function loadSamples() {
   const texts = await Promise.all(samples.map((sample) => nephroid.sample(sample.name)));
   samples.forEach((sample, i) => $("samples").append(card(sample, texts[i])));
   const first = Math.max(0, samples.findIndex((sample) => sample.name === "glass-ball"));
-  if (!samples.length || $("scene").value) return;
+  if (!samples.length || editor.text) return;
   $("samples").querySelectorAll("input")[first].checked = true;
   chooseSample(samples[first], texts[first]);
 }
@@ -74,22 +98,24 @@ function chooseSample(sample, text) {
 }
 
 function setScene(text) {
-  $("scene").value = text;
-  $("scene").scrollTop = 0;
+  editor.text = text;
   $("edited").hidden = true;
   chosen = null;
-  clearProblem();
-  numberLines();
 }
 
-let redrawing;
+let resting;
 function sceneEdited() {
   $("edited").hidden = false;
   chosen = null;
-  clearProblem();
-  numberLines();
-  clearTimeout(redrawing);
-  redrawing = setTimeout(() => following || showScene(), 150);
+  clearTimeout(resting);
+  resting = setTimeout(() => (following || showScene(), checkScene()), CHECK_AFTER);
+}
+
+/** Has the service look at what is being typed, without moving anything. */
+async function checkScene() {
+  const text = editor.text;
+  const wrong = await nephroid.plan(text).then(() => null, (error) => error);
+  if (wrong && text === editor.text) editor.showProblem(wrong, { jump: false });
 }
 
 /** What the frame shows while no job is followed: the sample's picture, or the outline of what is edited. */
@@ -97,10 +123,11 @@ function showScene() {
   if (location.hash) history.replaceState(null, "", location.pathname);
   following?.stop.abort();
   following = null;
-  for (const id of ["layers", "progress", "cancel", "reuse", "download", "download-exr", "plan-box"]) $(id).hidden = true;
+  layers.hide();
+  for (const id of ["progress", "cancel", "reuse", "download", "download-exr", "download-chart", "plan-box"]) $(id).hidden = true;
   drawErrorChart($("chart"), []);
   for (const id of ["rounds", "error", "time"]) $(id).textContent = "–";
-  const scene = parsed($("scene").value);
+  const scene = parsed(editor.text);
   if (scene) {
     const { width = 640, height = 480 } = scene.image ?? {};
     $("size").textContent = `${width} × ${height}`;
@@ -124,21 +151,12 @@ function parsed(text) {
   }
 }
 
-function numberLines(marked = new Set()) {
-  const count = $("scene").value.split("\n").length;
-  const lines = Array.from({ length: count }, (_, i) => {
-    const line = make("span", marked.has(i + 1) ? "wrong" : "", `${i + 1}\n`);
-    return line;
-  });
-  $("gutter").replaceChildren(...lines);
-  $("gutter").scrollTop = $("scene").scrollTop;
-}
-
 async function submitScene() {
-  clearProblem();
+  clearTimeout(resting);
+  editor.clearProblem();
   $("submit").disabled = true;
   try {
-    const job = await nephroid.submit($("scene").value);
+    const job = await nephroid.submit(editor.text);
     location.hash = job.id;
     if (matchMedia("(max-width: 60rem)").matches) $("picture-title").scrollIntoView({ block: "start" });
     recent.refresh();
@@ -154,16 +172,16 @@ async function reuseScene() {
   try {
     setScene(await nephroid.scene(following.id));
     for (const sample of $("samples").querySelectorAll("input")) sample.checked = false;
-    $("scene").focus();
+    editor.focus();
   } catch (error) {
     showProblem(error);
   }
 }
 
 async function showPlan() {
-  clearProblem();
+  editor.clearProblem();
   try {
-    fillPlan(await nephroid.plan($("scene").value));
+    fillPlan(await nephroid.plan(editor.text));
     $("plan-box").open = true;
     $("plan-box").scrollIntoView({ block: "nearest" });
   } catch (error) {
@@ -171,52 +189,8 @@ async function showPlan() {
   }
 }
 
-function clearProblem() {
-  $("problem").hidden = true;
-  $("scene").removeAttribute("aria-invalid");
-}
-
 function showProblem(error) {
-  const problem = error.problem ?? { title: "The service cannot be reached", detail: error.message };
-  const box = $("problem");
-  box.replaceChildren(make("strong", "", problem.title));
-  const errors = problem.errors ?? [];
-  if (!errors.length) box.append(make("p", "", problem.detail ?? ""));
-  else box.append(errorList(errors));
-  box.hidden = false;
-  const lines = errors.map((one) => one.line).filter(Boolean);
-  if (!errors.length) return;
-  $("scene").setAttribute("aria-invalid", "true");
-  numberLines(new Set(lines));
-  if (lines.length) selectLine(errors.find((one) => one.line).line);
-}
-
-function errorList(errors) {
-  const list = make("ul");
-  for (const error of errors) {
-    const item = make("li");
-    if (error.line) {
-      const jump = make("button", "jump", `line ${error.line}`);
-      jump.type = "button";
-      jump.addEventListener("click", () => selectLine(error.line));
-      item.append(jump);
-    }
-    if (error.pointer) item.append(make("code", "", error.pointer));
-    item.append(make("span", "", error.detail));
-    list.append(item);
-  }
-  return list;
-}
-
-function selectLine(number) {
-  const area = $("scene");
-  const lines = area.value.split("\n");
-  const start = lines.slice(0, number - 1).reduce((sum, line) => sum + line.length + 1, 0);
-  area.focus({ preventScroll: true });
-  area.setSelectionRange(start, start + (lines[number - 1]?.length ?? 0));
-  const height = area.scrollHeight / lines.length;
-  area.scrollTop = Math.max(0, (number - 1) * height - area.clientHeight / 2);
-  area.scrollIntoView({ block: "nearest" });
+  editor.showProblem(error);
 }
 
 // ---- the picture
@@ -226,28 +200,25 @@ function followAddress() {
   following?.stop.abort();
   following = null;
   if (!/^[0-9a-f-]{36}$/.test(id)) return showScene();
-  following = { id, stop: new AbortController(), history: [] };
+  following = { id, stop: new AbortController() };
+  layers.hide();
   show(null);
   follow(following).catch((error) => error.name === "AbortError" || lostJob(error));
 }
 
 async function follow(current) {
-  const { id, stop, history } = current;
+  const { id, stop } = current;
   let seen = 0;
   let state = "";
-  for await (const job of nephroid.follow(id, { signal: stop.signal, interval: 400 })) {
+  for await (const job of nephroid.follow(id, { signal: stop.signal, interval: 1000 })) {
     if (current !== following) return;
-    const last = history.at(-1)?.rounds ?? 0;
-    if (job.error_estimate && job.rounds > last) {
-      history.push({ rounds: job.rounds, error: job.error_estimate });
-    }
     showJob(job);
     if (job.state !== state) recent.refresh();
     state = job.state;
     if (state === "running" && job.rounds > seen) {
       seen = job.rounds;
       const blob = await nephroid.preview(id, { signal: stop.signal });
-      if (blob && current === following) await show(URL.createObjectURL(blob), "The picture so far");
+      if (blob && current === following) await show(URL.createObjectURL(blob), `The picture after ${seen} rounds`, seen);
     }
   }
 }
@@ -272,7 +243,7 @@ function showJob(job) {
   $("time").textContent = job.started_at ? elapsed(job) : "–";
   $("size").textContent = `${job.width} × ${job.height}`;
   $("said").textContent = sentence(job);
-  drawErrorChart($("chart"), following.history);
+  drawErrorChart($("chart"), job.history ?? []);
   if (job.plan) fillPlan(job.plan);
   showLinks(job);
 }
@@ -303,37 +274,22 @@ function stopWords(reason) {
 }
 
 function showLinks(job) {
-  const { image, exr } = job.links;
-  for (const [id, href, kind] of [["download", image, "png"], ["download-exr", exr, "exr"]]) {
+  const { image, exr, chart } = job.links;
+  const downloads = [["download", image, "png"], ["download-exr", exr, "exr"], ["download-chart", image && chart, "svg"]];
+  for (const [id, href, kind] of downloads) {
     $(id).hidden = !href;
     if (href) Object.assign($(id), { href, download: `${slug(job.name)}.${kind}` });
   }
-  const layers = Object.entries(job.links).filter(([name]) => name.startsWith("layer_"));
-  $("layers").hidden = !layers.length;
-  if (!image || $("layers").dataset.job === job.id && $("image").dataset.job === job.id) return;
-  $("layers").dataset.job = job.id;
-  const all = [["all paths", image], ...layers.map(([name, href]) => [name.slice(6), href])];
-  $("layers").replaceChildren(...all.map(([name, href], i) => layerButton(name, href, i === 0, job)));
-  show(image, `The finished picture: ${job.name}`, job.id);
-}
-
-function layerButton(name, href, pressed, job) {
-  const button = Object.assign(make("button", "", name), { type: "button" });
-  button.setAttribute("aria-pressed", pressed);
-  button.addEventListener("click", () => {
-    for (const other of $("layers").children) other.setAttribute("aria-pressed", other === button);
-    show(href, `${name} of ${job.name}`, job.id);
-  });
-  return button;
+  if (image) layers.offer(job);
 }
 
 /** Puts a picture into the frame once it is decoded; null brings the outline back. */
-async function show(url, words = "", job = "") {
+async function show(url, words = "", rounds = "") {
   const image = $("image");
   if (shownUrl?.startsWith("blob:")) URL.revokeObjectURL(shownUrl);
   shownUrl = url;
   image.hidden = !url;
-  image.dataset.job = job;
+  image.dataset.rounds = rounds;
   $("sketch").classList.toggle("under", Boolean(url));
   if (!url) return image.removeAttribute("src");
   const next = new Image();

@@ -126,7 +126,7 @@ async fn send_blanks(server: &Server, head: &str, body_bytes: usize) -> String {
     answer
 }
 
-fn peak_memory_kib(server: &Server) -> u64 {
+pub(crate) fn peak_memory_kib(server: &Server) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", server.child.id())).unwrap();
     let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
     line.split_whitespace().nth(1).unwrap().parse().unwrap()

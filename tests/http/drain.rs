@@ -2,7 +2,7 @@
 
 use crate::server::{Server, endless, quick, scene, until};
 use clap::Parser;
-use nephroid_api::config::Cli;
+use nephroid_api::config::{Cli, Command};
 use nephroid_api::{AppState, router, serve};
 use reqwest::StatusCode;
 use std::time::{Duration, Instant};
@@ -58,8 +58,9 @@ async fn stopping_any_number_of_times_is_no_failure_of_the_job() {
 #[tokio::test]
 async fn a_service_that_stops_is_not_ready_and_takes_no_jobs() {
     let data = tempfile::tempdir().unwrap();
-    let settings = Cli::parse_from(["nephroid-api", "--data", data.path().to_str().unwrap()]).into_settings();
-    let state = tokio::task::spawn_blocking(|| AppState::open(settings)).await.unwrap().unwrap();
+    let command = Cli::parse_from(["nephroid-api", "--data", data.path().to_str().unwrap()]).into_command();
+    let Command::Serve(settings) = command else { panic!("to serve is the default") };
+    let state = tokio::task::spawn_blocking(|| AppState::open(*settings)).await.unwrap().unwrap();
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     serve(listener, state.clone(), std::future::ready(())).await.unwrap();
 

@@ -20,12 +20,22 @@ pub(crate) struct Server {
 impl Server {
     /// Starts the binary with its data in `data`.
     pub(crate) fn start(data: &Path, arguments: &[&str]) -> Self {
+        Self::start_with(data, arguments, "warn", Stdio::inherit())
+    }
+
+    /// The same, with all that it says in a file.
+    pub(crate) fn start_logged(data: &Path, arguments: &[&str], log: &Path) -> Self {
+        Self::start_with(data, arguments, "info", std::fs::File::create(log).unwrap().into())
+    }
+
+    fn start_with(data: &Path, arguments: &[&str], filter: &str, log: Stdio) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_nephroid-api"))
             .args(["serve", "--listen", "127.0.0.1:0", "--data"])
             .arg(data)
             .args(arguments)
-            .env("NEPHROID_LOG", "warn")
+            .env("NEPHROID_LOG", filter)
             .stdout(Stdio::piped())
+            .stderr(log)
             .spawn()
             .unwrap();
         let mut line = String::new();

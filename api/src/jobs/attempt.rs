@@ -1,11 +1,14 @@
 //! One attempt at one job, round by round, on the render thread.
 
+use super::assets::Assets;
 use super::files::Files;
-use super::live::{Live, Progress};
-use super::sql::Outcome;
-use super::{Failure, JobId};
-use crate::engine::{LoadedScene, PlannedScene, RoundError, RunningRender};
+use super::live::{Live, Phase, Progress};
+use super::sql::{Claim, NewArtifact, Outcome};
+use super::{Failure, JobId, Owner, files};
+use crate::engine::{LoadedScene, Output, PlannedScene, RoundError, RunningRender};
+use crate::metrics::Metrics;
 use serde_json::Value;
+use std::io::{self, ErrorKind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -13,6 +16,8 @@ use std::time::{Duration, Instant};
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(2);
 /// The picture that people watch is renewed at most so often.
 const PREVIEW_INTERVAL: Duration = Duration::from_millis(250);
+/// The pictures of a job together, up to this size, go into the database: one wait for the disk instead of one each.
+const INLINE_BYTES: usize = 512 << 10;
 /// Housekeeping (checkpoints, previews) takes at most one part in so many of the time.
 const HOUSEKEEPING_SHARE: u32 = 20;
 
@@ -23,6 +28,8 @@ pub(super) enum Turn {
     Continue,
     /// The round was told to stop.
     Stopped,
+    /// The picture is made, and the disk has no room for it. The next turn tries again.
+    NoRoom,
     /// The attempt is over.
     Over(Result<Outcome, Failure>),
 }
@@ -31,9 +38,11 @@ pub(super) enum Turn {
 pub(super) struct Attempt {
     pub(super) id: JobId,
     pub(super) fence: u32,
+    pub(super) owner: Owner,
     /// Seconds of rendering that it has had, counted from what its rivals had when it came.
     pub(super) share: f64,
     pub(super) live: Arc<Live>,
+    began: Instant,
     render: RunningRender,
     checkpoint: Chore,
     preview: Chore,
@@ -61,10 +70,14 @@ impl Chore {
     }
 }
 
-/// Reads the scene of a job again and plans it.
-pub(super) fn prepare(files: &Files, id: JobId, limits: Limits) -> Result<(PlannedScene, Value), Failure> {
-    let text = files.scene(id).map_err(|error| internal("scene", &error))?;
-    let scene = LoadedScene::read(&text, limits.max_seconds).map_err(|issues| {
+/// Reads a scene again and plans it.
+pub(super) fn prepare(
+    text: &str,
+    (assets, owner): (&Assets, &Owner),
+    limits: Limits,
+) -> Result<(PlannedScene, Value), Failure> {
+    let own = assets.of(owner.clone());
+    let scene = LoadedScene::read(text, &own, limits.max_seconds).map_err(|issues| {
         let details: Vec<_> = issues.iter().map(|issue| issue.detail.as_str()).collect();
         Failure { code: "scene_invalid".into(), detail: details.join("; ") }
     })?;
@@ -73,6 +86,11 @@ pub(super) fn prepare(files: &Files, id: JobId, limits: Limits) -> Result<(Plann
     if needed > most {
         let detail = format!("The render would need {needed} bytes of memory; the limit is {most}.");
         return Err(Failure { code: "out_of_memory".into(), detail });
+    }
+    let (photons, most) = (planned.photons_per_round(), limits.max_photons);
+    if photons > most {
+        let detail = format!("A round would send {photons} photons; the limit is {most}.");
+        return Err(Failure { code: "limit_exceeded".into(), detail });
     }
     let report = planned.report();
     Ok((planned, report))
@@ -83,29 +101,40 @@ pub(super) fn prepare(files: &Files, id: JobId, limits: Limits) -> Result<(Plann
 pub(super) struct Limits {
     pub(super) max_seconds: f64,
     pub(super) max_memory: u64,
+    pub(super) max_photons: u64,
 }
 
 impl Attempt {
     pub(super) fn begin(
-        (id, fence): (JobId, u32),
+        claim: Claim,
         planned: PlannedScene,
         live: Arc<Live>,
         files: &Files,
     ) -> Result<Self, Failure> {
+        let Claim { id, attempt: fence, owner } = claim;
         let saved = files.checkpoint(id).map_err(|error| internal("checkpoint", &error))?;
-        let render = planned.begin(saved.as_deref());
+        let render = planned.begin(saved.as_ref().map(|(_, render)| render.as_slice()));
         let now = Instant::now();
         let checkpoint = Chore::new(now + CHECKPOINT_INTERVAL, CHECKPOINT_INTERVAL);
         let preview = Chore::new(now, PREVIEW_INTERVAL);
-        let attempt = Self { id, fence, share: 0.0, live, render, checkpoint, preview };
+        let attempt = Self { id, fence, owner, share: 0.0, live, began: now, render, checkpoint, preview };
+        attempt.live.enter_phase(Phase::Rendering);
         if attempt.render.rounds() > 0 {
+            attempt.live.resume(saved.map(|(history, _)| history).unwrap_or_default());
             attempt.live.round_finished(attempt.progress());
         }
         Ok(attempt)
     }
 
     /// Runs one round, and what is due after it.
-    pub(super) fn take_turn(&mut self, files: &Files) -> Turn {
+    pub(super) fn take_turn(&mut self, files: &Files, metrics: &Metrics) -> Turn {
+        let before = self.render.work();
+        let turn = self.advance(files);
+        metrics.worked(before, self.render.work());
+        turn
+    }
+
+    fn advance(&mut self, files: &Files) -> Turn {
         // A checkpoint may be of a render that had just ended.
         if self.render.stop_reason().is_none() {
             match self.render.run_round(&self.live.control) {
@@ -123,17 +152,23 @@ impl Attempt {
         // After the preview: who reads of a finished round finds the picture of it.
         self.live.round_finished(self.progress());
         if over {
-            return Turn::Over(self.conclude(files));
+            return self.conclude(files);
         }
-        self.checkpoint.run(|| save_checkpoint(files, self.id, &self.render));
+        let Self { checkpoint, render, live, id, .. } = self;
+        checkpoint.run(|| save_checkpoint(files, *id, live, render));
         Turn::Continue
     }
 
     /// Puts the attempt aside so that a later one goes on from here.
     pub(super) fn put_aside(&self, files: &Files) {
         if self.render.rounds() > 0 {
-            save_checkpoint(files, self.id, &self.render);
+            save_checkpoint(files, self.id, &self.live, &self.render);
         }
+    }
+
+    /// Time since it began.
+    pub(super) fn age(&self) -> Duration {
+        self.began.elapsed()
     }
 
     pub(super) fn seconds(&self) -> f64 {
@@ -142,35 +177,61 @@ impl Attempt {
 
     fn progress(&self) -> Progress {
         Progress {
+            phase: Phase::Rendering,
+            seconds: self.render.seconds(),
             fraction: self.render.progress(),
             rounds: self.render.rounds(),
             error_estimate: self.render.error_estimate(),
         }
     }
 
-    fn conclude(&self, files: &Files) -> Result<Outcome, Failure> {
-        let encoding = |detail| {
-            tracing::error!(job = %self.id, detail, "a picture could not be encoded");
-            Failure::internal("The picture could not be encoded.")
+    fn conclude(&self, files: &Files) -> Turn {
+        if self.live.control.is_cancelled() {
+            return Turn::Stopped;
+        }
+        self.live.enter_phase(Phase::Encoding);
+        let outputs = match self.render.outputs() {
+            Ok(outputs) => outputs,
+            Err(detail) => {
+                tracing::error!(job = %self.id, detail, "a picture could not be encoded");
+                return Turn::Over(Err(Failure::internal("The picture could not be encoded.")));
+            }
         };
-        let outputs = self.render.outputs().map_err(encoding)?;
-        let save = |output: &crate::engine::Output| {
-            files.save_artifact((self.id, self.fence), &output.name, &output.bytes)
+        match self.keep(files, outputs) {
+            Ok(artifacts) => Turn::Over(Ok(self.outcome(artifacts))),
+            Err(error) if error.kind() == ErrorKind::StorageFull => Turn::NoRoom,
+            Err(error) => Turn::Over(Err(internal("picture", &error))),
+        }
+    }
+
+    fn keep(&self, files: &Files, outputs: Vec<Output>) -> io::Result<Vec<NewArtifact>> {
+        let small = outputs.iter().map(|output| output.bytes.len()).sum::<usize>() <= INLINE_BYTES;
+        let keep = |output: Output| {
+            let artifact = files::artifact_of(&output.name, self.fence, &output.bytes);
+            if !small {
+                files.save_artifact(self.id, &artifact, &output.bytes)?;
+            }
+            let bytes = output.bytes.len() as u64;
+            Ok(NewArtifact { artifact, bytes, data: small.then_some(output.bytes) })
         };
-        let artifacts = outputs.iter().map(save).collect::<Result<_, _>>();
-        Ok(Outcome {
+        outputs.into_iter().map(keep).collect()
+    }
+
+    fn outcome(&self, artifacts: Vec<NewArtifact>) -> Outcome {
+        Outcome {
             rounds: self.render.rounds(),
             error_estimate: self.render.error_estimate(),
             stop_reason: self.render.stop_reason().map(Into::into),
             stats: Some(self.render.stats()),
+            history: self.live.history(),
             failure: None,
-            artifacts: artifacts.map_err(|error| internal("picture", &error))?,
-        })
+            artifacts,
+        }
     }
 }
 
-fn save_checkpoint(files: &Files, id: JobId, render: &RunningRender) {
-    if let Err(error) = files.save_checkpoint(id, &render.checkpoint()) {
+fn save_checkpoint(files: &Files, id: JobId, live: &Live, render: &RunningRender) {
+    if let Err(error) = files.save_checkpoint(id, &live.history(), &render.checkpoint()) {
         // The render goes on; only a crash would now cost more.
         tracing::error!(job = %id, %error, "a checkpoint could not be written");
     }

@@ -1,11 +1,13 @@
 //! What is known of running jobs between two writes to the database: progress, preview, the stop signal.
 
-use super::JobId;
+use super::{JobId, Milestone};
 use crate::engine::{Control, Picture};
+use serde::Serialize;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use tokio::sync::broadcast;
+use utoipa::ToSchema;
 
 /// Changes that a slow listener may fall behind before it is told to look again.
 const BACKLOG: usize = 256;
@@ -14,9 +16,26 @@ const BACKLOG: usize = 256;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Change(pub JobId);
 
+/// What is being done for a job that runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// Finding out what the scene needs.
+    #[default]
+    Planning,
+    /// Photons and eye rays.
+    Rendering,
+    /// Writing the pictures.
+    Encoding,
+}
+
 /// How far a render is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Progress {
+    /// What is being done.
+    pub phase: Phase,
+    /// Seconds spent rendering.
+    pub seconds: f64,
     /// From 0 to 1, a guess from the rule that will end the render.
     pub fraction: f32,
     /// Rounds that are finished.
@@ -38,6 +57,7 @@ struct LiveState {
     progress: Progress,
     /// What the latest round added to the fraction: the guess for the one that runs.
     last_step: f32,
+    history: Vec<Milestone>,
     preview: Option<Arc<Preview>>,
 }
 
@@ -53,6 +73,24 @@ impl Live {
         let mut state = lock(&self.state);
         state.last_step = (progress.fraction - state.progress.fraction).max(0.0);
         state.progress = progress;
+        let Some(error) = progress.error_estimate else { return };
+        // The estimate is renewed at some rounds only.
+        if state.history.last().is_none_or(|last| last.error != error && last.rounds < progress.rounds) {
+            state.history.push(Milestone { rounds: progress.rounds, seconds: progress.seconds, error });
+        }
+    }
+
+    /// The render goes on from a checkpoint.
+    pub(super) fn resume(&self, history: Vec<Milestone>) {
+        lock(&self.state).history = history;
+    }
+
+    pub(super) fn history(&self) -> Vec<Milestone> {
+        lock(&self.state).history.clone()
+    }
+
+    pub(super) fn enter_phase(&self, phase: Phase) {
+        lock(&self.state).progress.phase = phase;
     }
 
     pub(super) fn show(&self, picture: Picture) {

@@ -1,24 +1,38 @@
 //! Jobs: what one is, and the one function that moves it from state to state.
 //!
-//! `store` keeps them in SQLite (`sql` has the statements), `files` keeps scenes, checkpoints and
-//! pictures beside it, `scheduler` renders them (`attempt` is one render of one job), `live` is what is
+//! `store` keeps them in SQLite (`schema` has the tables, `sql` and `query` the statements), `files` keeps large scenes,
+//! checkpoints and pictures beside it, `assets` what scenes refer to, `keys` who may come; `retention` forgets, `scheduler` renders them (`attempt` is one render of one job), `live` is what is
 //! known of a running job between two writes, and [`service::Jobs`] is all of it for the handlers.
 
+mod answers;
+mod assets;
 mod attempt;
 mod files;
+mod keys;
 mod live;
+mod look;
+mod query;
+mod retention;
 mod scheduler;
+mod schema;
 pub mod service;
 mod sql;
 mod store;
 
-pub use live::{Change, Progress};
+pub use answers::Answer;
+pub(crate) use assets::is_sha256;
+pub use assets::{Upload, UploadError};
+pub use keys::{Key, KeyAdmin};
+pub use live::{Change, Phase, Progress};
 pub use sql::{Artifact, Page};
 pub use store::StoreError;
 
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
+use utoipa::ToSchema;
 use uuid::Uuid;
 
 /// The name of a job, unique for ever.
@@ -47,8 +61,54 @@ impl FromStr for JobId {
     }
 }
 
+/// Whose a job or an asset is: the id of an API key, or nobody's in particular.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Owner(Arc<str>);
+
+impl Owner {
+    /// Whoever comes without a key.
+    #[must_use]
+    pub fn anonymous() -> Self {
+        Self::of("")
+    }
+
+    /// The owner of this key id.
+    pub fn of(id: impl Into<Arc<str>>) -> Self {
+        Self(id.into())
+    }
+
+    /// The key's id; empty for nobody in particular.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// True for whoever comes without a key.
+    #[must_use]
+    pub fn is_anonymous(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// A name that two owners may give to different things.
+    fn scoped(&self, name: &str) -> String {
+        // Names that clients give are visible ASCII, so that none can hold the separator.
+        if self.is_anonymous() { name.to_owned() } else { format!("{}\n{name}", self.0) }
+    }
+}
+
+/// The estimated error at one moment of a render.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Milestone {
+    /// Rounds finished by then.
+    pub rounds: u32,
+    /// Seconds of rendering by then.
+    pub seconds: f64,
+    /// Estimated relative error by then.
+    pub error: f32,
+}
+
 /// Where a job is in its life.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobState {
     /// Waits for a turn.
@@ -139,6 +199,10 @@ pub struct Job {
     pub seq: i64,
     /// Its name.
     pub id: JobId,
+    /// Whose it is.
+    pub owner: Owner,
+    /// What its owner calls it.
+    pub label: Option<String>,
     /// Where it is in its life.
     pub state: JobState,
     /// How often it was started. Also the fencing token: what an older attempt writes is refused.
@@ -165,8 +229,12 @@ pub struct Job {
     pub plan: Option<Value>,
     /// What the render counted.
     pub stats: Option<Value>,
+    /// The estimated error against time.
+    pub history: Vec<Milestone>,
     /// Why it failed.
     pub failure: Option<Failure>,
+    /// Size of its scene and pictures.
+    pub bytes: u64,
     /// The pictures it left.
     pub artifacts: Vec<Artifact>,
 }

@@ -1,40 +1,47 @@
 //! The render thread: takes jobs from the queue and gives each running job one round at a time.
 //!
-//! The next round goes to the running job that has had the least time, so that small renders pass
-//! between the rounds of a long one. Rounds use all threads of the pool; nothing else does.
+//! The next round goes to the owner who has had the least time, and of that owner's running jobs to the one that
+//! has had the least: small renders pass between the rounds of a long one, and many jobs of one key take no more
+//! than one of another. Rounds use all threads of the pool; nothing else does.
 
+use super::assets::Assets;
 use super::attempt::{self, Attempt, Limits, Turn};
 use super::files::Files;
 use super::live::Registry;
-use super::sql::{self, Outcome};
+use super::retention::Ended;
+use super::sql::{self, Claim, Outcome};
 use super::store::{Store, StoreError};
-use super::{Event, Failure, JobId, service::now_ms};
+use super::{Event, Failure, JobId, Owner, query, service::now_ms};
+use crate::engine::PlannedScene;
+use crate::metrics::Metrics;
 use serde_json::Value;
 use std::any::Any;
+use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, mpsc};
+use std::time::Duration;
+
+/// After this time is tried again what the database or the disk refused.
+const RETRY: Duration = Duration::from_secs(1);
 
 /// Wakes the render thread: there is a new job, or it is time to stop.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wake;
 
-/// What became of the first write of an attempt.
-enum Recorded {
-    Wanted,
-    /// The job was cancelled or deleted while it was planned.
-    Unwanted,
-    Failed,
-}
-
 /// The render thread's own things.
 pub(super) struct Scheduler {
     pub(super) store: Store,
     pub(super) files: Files,
+    pub(super) assets: Assets,
+    pub(super) metrics: Arc<Metrics>,
+    pub(super) ended: mpsc::Sender<Ended>,
     pub(super) registry: Arc<Registry>,
     pub(super) pool: rayon::ThreadPool,
     pub(super) concurrent: usize,
     pub(super) limits: Limits,
     pub(super) running: Vec<Attempt>,
+    /// Seconds of rendering of each owner for whom something runs, counted from what the others had then.
+    pub(super) shares: HashMap<Owner, f64>,
 }
 
 impl Scheduler {
@@ -44,9 +51,11 @@ impl Scheduler {
             self.admit();
             match self.neediest() {
                 Some(index) => self.give_turn(index),
-                // A wake that came since `admit` is still in the inbox.
-                None if inbox.recv().is_err() => break,
-                None => while inbox.try_recv().is_ok() {},
+                // A wake that came since `admit` is still in the inbox; without one, the database is asked again.
+                None => match inbox.recv_timeout(RETRY) {
+                    Err(mpsc::RecvTimeoutError::Disconnected) => break,
+                    _ => while inbox.try_recv().is_ok() {},
+                },
             }
         }
         self.put_all_aside();
@@ -54,7 +63,8 @@ impl Scheduler {
 
     fn admit(&mut self) {
         while self.running.len() < self.concurrent && !self.registry.is_draining() {
-            match self.store.write_blocking(|db| sql::claim(db, now_ms())) {
+            // If this is taken back by a crash, the job waits still; what this attempt made is then refused.
+            match self.store.write_early(|db| sql::claim(db, now_ms())) {
                 Ok(Some(job)) => self.begin(job),
                 Ok(None) => return,
                 Err(error) => {
@@ -65,23 +75,24 @@ impl Scheduler {
         }
     }
 
-    fn begin(&mut self, (id, fence): (JobId, u32)) {
+    fn begin(&mut self, claim: Claim) {
+        let (id, fence, owner) = (claim.id, claim.attempt, claim.owner.clone());
         let live = self.registry.enter(id);
         self.registry.announce(id);
-        let prepare = || self.pool.install(|| attempt::prepare(&self.files, id, self.limits));
-        let planned = match guarded(prepare) {
-            Ok((planned, report)) => match self.record_plan((id, fence), report) {
-                Recorded::Wanted => Ok(planned),
-                Recorded::Unwanted => return self.registry.leave(id),
-                Recorded::Failed => Err(Failure::internal("The service could not record the plan.")),
-            },
-            Err(failure) => Err(failure),
-        };
-        match planned.and_then(|planned| guarded(|| Attempt::begin((id, fence), planned, live, &self.files)))
-        {
+        let begun = self.prepare(&claim).and_then(|(planned, report)| {
+            let record = move |db: &rusqlite::Connection| sql::record_plan(db, id, fence, &report);
+            // Nobody waits for it: a job that was cancelled meanwhile is stopped before its first round.
+            if let Err(error) = self.store.write_soon(record) {
+                tracing::warn!(job = %id, %error, "a plan was not recorded");
+            }
+            guarded(|| Attempt::begin(claim, planned, live, &self.files))
+        });
+        match begun {
             Ok(mut attempt) => {
                 let least = self.running.iter().map(|rival| rival.share).reduce(f64::min);
                 attempt.share = least.unwrap_or(0.0);
+                let others = self.shares.values().copied().reduce(f64::min).unwrap_or(0.0);
+                self.shares.entry(owner).or_insert(others);
                 self.running.push(attempt);
                 tracing::info!(job = %id, attempt = fence, "started");
             }
@@ -89,43 +100,62 @@ impl Scheduler {
         }
     }
 
-    fn record_plan(&self, (id, fence): (JobId, u32), report: Value) -> Recorded {
-        match self.store.write_blocking(move |db| sql::record_plan(db, id, fence, &report)) {
-            Ok(()) => Recorded::Wanted,
-            Err(StoreError::StaleAttempt) => Recorded::Unwanted,
-            Err(error) => {
-                tracing::error!(job = %id, %error, "a plan could not be recorded");
-                Recorded::Failed
-            }
-        }
+    fn prepare(&self, claim: &Claim) -> Result<(PlannedScene, Value), Failure> {
+        let id = claim.id;
+        let kept = self.store.read_blocking(|db| query::scene(db, id)).ok().flatten();
+        let text = kept.map_or_else(|| self.files.scene(id), Ok).map_err(|error| {
+            tracing::error!(job = %id, %error, "a scene could not be read");
+            Failure::internal("The service could not read its scene.")
+        })?;
+        let prepare = || attempt::prepare(&text, (&self.assets, &claim.owner), self.limits);
+        guarded(|| self.pool.install(prepare))
     }
 
-    /// The running job that has had the least time.
+    /// The running job whose turn it is.
     fn neediest(&self) -> Option<usize> {
-        (0..self.running.len()).min_by(|&a, &b| self.running[a].share.total_cmp(&self.running[b].share))
+        let share =
+            |attempt: &Attempt| (self.shares.get(&attempt.owner).copied().unwrap_or_default(), attempt.share);
+        let order = |a: (f64, f64), b: (f64, f64)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1));
+        (0..self.running.len()).min_by(|&a, &b| order(share(&self.running[a]), share(&self.running[b])))
     }
 
     fn give_turn(&mut self, index: usize) {
-        let Self { pool, files, running, .. } = self;
+        let Self { pool, files, running, metrics, shares, .. } = self;
         let attempt = &mut running[index];
         let before = attempt.seconds();
-        let turn = guarded(|| Ok(pool.install(|| attempt.take_turn(files))));
+        let turn = guarded(|| Ok(pool.install(|| attempt.take_turn(files, metrics))));
         // A floor, so that rounds that take no time still pass the turn on.
-        attempt.share += (attempt.seconds() - before).max(1e-6);
+        let took = (attempt.seconds() - before).max(1e-6);
+        attempt.share += took;
+        shares.entry(attempt.owner.clone()).and_modify(|share| *share += took);
         match turn.unwrap_or_else(|failure| Turn::Over(Err(failure))) {
             Turn::Continue => self.registry.announce(self.running[index].id),
             Turn::Over(end) => {
-                let attempt = self.running.swap_remove(index);
+                let attempt = self.remove(index);
+                self.metrics
+                    .job_ended(end.as_ref().err().map(|failure| failure.code.as_str()), attempt.age());
                 self.conclude((attempt.id, attempt.fence), end);
+            }
+            Turn::NoRoom => {
+                tracing::error!(job = %self.running[index].id, "the disk has no room for a picture");
+                std::thread::sleep(RETRY);
             }
             // Left in place, to be put aside.
             Turn::Stopped if self.registry.is_draining() => {}
             Turn::Stopped => {
-                let attempt = self.running.swap_remove(index);
+                let attempt = self.remove(index);
                 self.files.discard_checkpoint(attempt.id);
                 self.registry.leave(attempt.id);
             }
         }
+    }
+
+    fn remove(&mut self, index: usize) -> Attempt {
+        let attempt = self.running.swap_remove(index);
+        if self.running.iter().all(|other| other.owner != attempt.owner) {
+            self.shares.remove(&attempt.owner);
+        }
+        attempt
     }
 
     fn conclude(&self, (id, fence): (JobId, u32), end: Result<Outcome, Failure>) {
@@ -134,15 +164,27 @@ impl Scheduler {
             Err(failure) => (Event::Fail, Outcome { failure: Some(failure), ..Outcome::default() }),
         };
         tracing::info!(job = %id, attempt = fence, rounds = outcome.rounds, failure = ?outcome.failure, "ended");
-        let recorded =
-            self.store.write_blocking(move |db| sql::conclude(db, (id, fence), event, &outcome, now_ms()));
-        match recorded {
-            Ok(()) => self.files.discard_checkpoint(id),
-            // Cancelled or deleted at the last moment: its owner does not want the result.
-            Err(StoreError::IllegalMove(_) | StoreError::NotFound) => {}
-            Err(error) => tracing::error!(job = %id, %error, "a result could not be recorded"),
+        let outcome = Arc::new(outcome);
+        loop {
+            let same = Arc::clone(&outcome);
+            match self.store.write_blocking(move |db| sql::conclude(db, (id, fence), event, &same, now_ms()))
+            {
+                Ok(()) => self.files.discard_checkpoint(id),
+                // Cancelled or deleted at the last moment: its owner does not want the result.
+                Err(StoreError::IllegalMove(_) | StoreError::NotFound | StoreError::StaleAttempt) => {}
+                // As long as this cannot be written nothing can, and nothing is lost by waiting.
+                Err(error) if !self.registry.is_draining() => {
+                    tracing::error!(job = %id, %error, "a result could not be recorded");
+                    std::thread::sleep(RETRY);
+                    continue;
+                }
+                Err(error) => tracing::error!(job = %id, %error, "a result is lost; it will be made again"),
+            }
+            break;
         }
         self.registry.leave(id);
+        // The other end is gone only while the service stops.
+        let _ = self.ended.send(Ended);
     }
 
     fn put_all_aside(&mut self) {

@@ -1,15 +1,21 @@
 //! All of the jobs for the handlers: submit, look, wait, cancel, delete, drain.
 
+use super::answers::Answers;
+use super::assets::{Assets, OwnAssets, Upload};
 use super::attempt::Limits;
 use super::files::{Files, hex};
+use super::keys::KeyTable;
 use super::live::{Change, Progress, Registry};
+use super::retention::{self, Policy};
 use super::scheduler::{Scheduler, Wake};
-use super::sql::{self, IdempotencyKey, NewJob, Submitted};
+use super::sql::{self, IdempotencyKey, NewJob, QueueLimits, Submitted};
 use super::store::Store;
-use super::{Artifact, Event, Job, JobId, JobState, Page, StoreError};
+use super::{Event, Job, JobId, JobState, Owner, StoreError, query};
 use crate::config::Settings;
 use crate::engine::LoadedScene;
+use crate::metrics::Metrics;
 use sha2::{Digest, Sha256};
+use std::collections::HashMap;
 use std::fs::{File, TryLockError};
 use std::io;
 use std::path::PathBuf;
@@ -17,10 +23,11 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::broadcast;
-use tokio::time::Instant;
 
 /// Many times what a render takes to stop.
 const STOP_TIME: Duration = Duration::from_secs(5);
+/// Scenes up to this size go into the database: one wait for the disk instead of several.
+const INLINE_SCENE: usize = 64 << 10;
 
 /// Why the service could not start.
 #[derive(Debug, thiserror::Error)]
@@ -46,8 +53,21 @@ pub struct Submission {
     pub text: String,
     /// The same, read.
     pub scene: LoadedScene,
+    /// Whose it is.
+    pub owner: Owner,
+    /// What its owner calls it.
+    pub label: Option<String>,
     /// The client's own name for the request.
     pub idempotency_key: Option<String>,
+}
+
+/// What became of a submission.
+#[derive(Debug)]
+pub struct Accepted {
+    /// The job.
+    pub status: Status,
+    /// True if the same request had made the job before.
+    pub replayed: bool,
 }
 
 /// A job, and what is known of it since the database was written.
@@ -55,6 +75,8 @@ pub struct Submission {
 pub struct Status {
     /// The job.
     pub job: Job,
+    /// When it will be forgotten, in milliseconds since 1970, once it is done.
+    pub expires_ms: Option<i64>,
     /// How far its render is, if it runs.
     pub progress: Option<Progress>,
     /// How many jobs are before it, if it waits.
@@ -67,7 +89,7 @@ pub enum PreviewState {
     /// PNG of the finished rounds.
     Ready(Arc<[u8]>),
     /// The job is done; here is its picture.
-    Final(PathBuf),
+    Final(Vec<u8>),
     /// Nothing to see in this state.
     Nothing(JobState),
 }
@@ -75,143 +97,169 @@ pub enum PreviewState {
 /// All jobs of this service.
 #[derive(Debug)]
 pub struct Jobs {
-    store: Store,
-    files: Files,
-    registry: Arc<Registry>,
+    pub(super) store: Store,
+    pub(super) files: Files,
+    pub(super) registry: Arc<Registry>,
+    pub(super) answers: Answers,
+    assets: Assets,
+    keys: KeyTable,
     wake: mpsc::Sender<Wake>,
     render_thread: Mutex<Option<JoinHandle<()>>>,
-    max_queue: u32,
+    queue_limits: QueueLimits,
+    min_free: u64,
+    pub(super) keep_age_ms: i64,
     /// Held as long as the data folder is in use.
     _lock: File,
 }
 
 impl Jobs {
     /// Opens the data folder, puts what had been running back into the queue and starts to render.
-    pub fn open(settings: &Settings) -> Result<Self, OpenError> {
+    pub fn open(settings: &Settings, metrics: Arc<Metrics>) -> Result<Self, OpenError> {
         let files = Files::new(settings.data.join("jobs"))?;
         let lock = lock_folder(settings)?;
         let store = Store::open(&settings.data.join("jobs.sqlite"))?;
-        let recovered = store.write_blocking(|db| sql::recover(db, now_ms()))?;
+        let recovered = {
+            let most = settings.max_deaths;
+            store.write_blocking(move |db| sql::recover(db, most, now_ms()))?
+        };
         if recovered > 0 {
             tracing::warn!(recovered, "jobs had been running when the service ended");
         }
         files.sweep(&store.write_blocking(sql::ids)?)?;
+        let assets = Assets::new(store.clone(), settings.data.join("assets"))?;
         let registry = Arc::<Registry>::default();
         let (wake, inbox) = mpsc::channel();
-        let threads = settings.threads.map_or(0, usize::from);
-        let name = |index| format!("render-{index}");
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build()?;
-        let limits = Limits { max_seconds: settings.max_seconds, max_memory: settings.max_memory as u64 };
+        let (ended, endings) = mpsc::channel();
         let scheduler = Scheduler {
             store: store.clone(),
             files: files.clone(),
+            assets: assets.clone(),
+            metrics,
+            ended,
             registry: Arc::clone(&registry),
-            pool,
+            pool: render_pool(settings)?,
             concurrent: usize::from(settings.concurrent),
-            limits,
+            limits: Limits {
+                max_seconds: settings.max_seconds,
+                max_memory: settings.max_memory as u64,
+                max_photons: settings.max_photons,
+            },
             running: Vec::new(),
+            shares: HashMap::new(),
         };
         let thread =
             std::thread::Builder::new().name("render".into()).spawn(move || scheduler.run(&inbox))?;
-        let render_thread = Mutex::new(Some(thread));
-        Ok(Self { store, files, registry, wake, render_thread, max_queue: settings.queue, _lock: lock })
+        let policy =
+            Policy { age: settings.keep_age, jobs: settings.keep_jobs, bytes: settings.keep_bytes as u64 };
+        let (own_store, own_files, own_assets) = (store.clone(), files.clone(), assets.clone());
+        std::thread::Builder::new()
+            .name("retention".into())
+            .spawn(move || retention::run(policy, &own_store, (&own_files, &own_assets), &endings))?;
+        Ok(Self {
+            keys: KeyTable::new(store.clone()),
+            store,
+            files,
+            registry,
+            assets,
+            answers: Answers::default(),
+            wake,
+            render_thread: Mutex::new(Some(thread)),
+            queue_limits: QueueLimits { queued: settings.queue, unfinished: settings.jobs_per_key },
+            min_free: settings.min_free as u64,
+            keep_age_ms: retention::millis(settings.keep_age),
+            _lock: lock,
+        })
     }
 
-    /// Takes a job; when this returns, it is on disk. True if the same request had made the job before.
-    pub async fn submit(&self, submission: Submission) -> Result<(JobId, bool), StoreError> {
-        let Submission { text, scene, idempotency_key } = submission;
+    /// Takes a job; when this returns, it is on disk.
+    pub async fn submit(&self, submission: Submission) -> Result<Accepted, StoreError> {
+        self.require_room()?;
+        let Submission { text, scene, owner, label, idempotency_key } = submission;
         let fingerprint = || hex(&Sha256::digest(text.as_bytes()));
         let idempotency = idempotency_key.map(|key| IdempotencyKey { key, fingerprint: fingerprint() });
         let id = JobId::fresh();
-        let name = scene.name().to_owned();
-        let job = NewJob { id, name, size: scene.size(), created_ms: now_ms(), idempotency };
-        let files = self.files.clone();
-        let saving = tokio::task::spawn_blocking(move || files.save_scene(id, &text));
-        if let Err(error) = saving.await.map_err(io::Error::other).flatten() {
-            tracing::error!(%error, "a scene could not be stored");
+        let bytes = text.len() as u64;
+        let inline = text.len() <= INLINE_SCENE;
+        let job = NewJob {
+            id,
+            owner: owner.clone(),
+            name: scene.name().to_owned(),
+            label,
+            size: scene.size(),
+            created_ms: now_ms(),
+            scene: None,
+            bytes,
+            assets: scene.assets,
+            idempotency,
+        };
+        let job =
+            if inline { NewJob { scene: Some(text), ..job } } else { self.save_scene(id, text, job).await? };
+        let limits = self.queue_limits;
+        let insert = move |db: &rusqlite::Connection| {
+            let submitted = sql::insert(db, &job, limits)?;
+            let (Submitted::New(id, _) | Submitted::Replayed(id)) = submitted;
+            Ok((submitted, query::get(db, &job.owner, id)?))
+        };
+        let submitted = self.store.write(insert).await;
+        if !inline && !matches!(submitted, Ok((Submitted::New(..), _))) {
             self.files.remove(id);
-            return Err(StoreError::NotCommitted);
         }
-        let max_queue = self.max_queue;
-        let submitted = self.store.write(move |db| sql::insert(db, &job, max_queue)).await;
-        match submitted {
-            Ok(Submitted::New(id)) => {
+        match submitted? {
+            (Submitted::New(id, before), job) => {
                 self.registry.announce(id);
                 // The render thread is gone only while the service drains.
                 let _ = self.wake.send(Wake);
-                Ok((id, false))
+                let status = Status { job, expires_ms: None, progress: None, queue_position: Some(before) };
+                Ok(Accepted { status, replayed: false })
             }
-            Ok(Submitted::Replayed(known)) => {
-                self.files.remove(id);
-                Ok((known, true))
-            }
-            Err(error) => {
-                self.files.remove(id);
-                Err(error)
+            (Submitted::Replayed(id), _) => {
+                Ok(Accepted { status: self.status(&owner, id).await?, replayed: true })
             }
         }
     }
 
-    /// A job and how far it is.
-    pub async fn status(&self, id: JobId) -> Result<Status, StoreError> {
-        // Looked up first: if the job ends in between, the database has the news.
-        let live = self.registry.get(id);
-        let find = move |db: &rusqlite::Connection| {
-            let job = sql::get(db, id)?.ok_or(StoreError::NotFound)?;
-            let waits = job.state == JobState::Queued;
-            let position = waits.then(|| sql::queue_position(db, job.seq)).transpose()?;
-            Ok((job, position))
-        };
-        let (job, queue_position) = self.store.read(find).await?;
-        let progress = live.filter(|_| job.state == JobState::Running).map(|live| live.progress());
-        Ok(Status { job, progress, queue_position })
+    async fn save_scene(&self, id: JobId, text: String, job: NewJob) -> Result<NewJob, StoreError> {
+        let files = self.files.clone();
+        let saving = tokio::task::spawn_blocking(move || files.save_scene(id, &text)).await;
+        let Err(error) = saving.map_err(io::Error::other).flatten() else { return Ok(job) };
+        tracing::error!(%error, "a scene could not be stored");
+        self.files.remove(id);
+        let full = error.kind() == io::ErrorKind::StorageFull;
+        Err(if full { StoreError::StorageFull } else { StoreError::NotCommitted })
     }
 
-    /// The same, once the job is done or the time is over.
-    pub async fn status_within(&self, id: JobId, wait: Duration) -> Result<Status, StoreError> {
-        let deadline = Instant::now() + wait;
-        let mut changes = self.registry.listen();
-        loop {
-            let status = self.status(id).await?;
-            if status.job.state.is_done() || self.registry.is_draining() {
-                return Ok(status);
-            }
-            if tokio::time::timeout_at(deadline, heard_of(&mut changes, id)).await.is_err() {
-                return Ok(status);
-            }
+    /// Refuses what is new while the disk is nearly full, so that what exists can be finished.
+    pub(crate) fn require_room(&self) -> Result<(), StoreError> {
+        match self.files.free_bytes() {
+            Some(free) if free < self.min_free => Err(StoreError::StorageFull),
+            _ => Ok(()),
         }
     }
 
-    /// Jobs, newest first.
-    pub async fn list(&self, page: Page) -> Result<Vec<Status>, StoreError> {
-        let jobs = self.store.read(move |db| sql::list(db, page)).await?;
-        let status = |job: Job| {
-            let live = self.registry.get(job.id).filter(|_| job.state == JobState::Running);
-            Status { job, progress: live.map(|live| live.progress()), queue_position: None }
+    /// Cancels a job; one that is done stays as it is. True if it was not done.
+    pub async fn cancel(&self, owner: &Owner, id: JobId) -> Result<bool, StoreError> {
+        let whose = owner.clone();
+        let cancel = move |db: &rusqlite::Connection| {
+            query::get(db, &whose, id)?;
+            sql::apply(db, id, Event::Cancel, None, now_ms())
         };
-        Ok(jobs.into_iter().map(status).collect())
-    }
-
-    /// Cancels a job; one that is done stays as it is.
-    pub async fn cancel(&self, id: JobId) -> Result<(), StoreError> {
-        let cancel = move |db: &rusqlite::Connection| sql::apply(db, id, Event::Cancel, None, now_ms());
         match self.store.write(cancel).await {
             Ok(_) => {
                 if let Some(live) = self.registry.get(id) {
                     live.control.cancel();
                 }
                 self.registry.announce(id);
-                Ok(())
+                Ok(true)
             }
-            Err(StoreError::IllegalMove(_)) => Ok(()),
+            Err(StoreError::IllegalMove(_)) => Ok(false),
             Err(error) => Err(error),
         }
     }
 
     /// Cancels a job if it is not done, and forgets it.
-    pub async fn delete(&self, id: JobId) -> Result<(), StoreError> {
+    pub async fn delete(&self, owner: &Owner, id: JobId) -> Result<(), StoreError> {
         let mut changes = self.registry.listen();
-        self.cancel(id).await?;
+        self.cancel(owner, id).await?;
         // While it still stops, it may write into its folder.
         while self.registry.get(id).is_some() {
             if tokio::time::timeout(STOP_TIME, heard_of(&mut changes, id)).await.is_err() {
@@ -226,41 +274,45 @@ impl Jobs {
         Ok(())
     }
 
-    /// The file of a picture; `Err` holds the state of a job that has no such picture.
-    pub async fn artifact(
-        &self,
-        id: JobId,
-        name: &str,
-    ) -> Result<Result<(Artifact, PathBuf), JobState>, StoreError> {
-        let job = self.status(id).await?.job;
-        let found = job.artifacts.into_iter().find(|artifact| artifact.name == name);
-        Ok(found
-            .map(|artifact| {
-                let path = self.files.artifact_path(id, &artifact);
-                (artifact, path)
-            })
-            .ok_or(job.state))
+    /// Calls out whatever changes from now on.
+    pub(crate) fn listen(&self) -> broadcast::Receiver<Change> {
+        self.registry.listen()
     }
 
-    /// The scene of a job, as it came.
-    pub async fn scene(&self, id: JobId) -> Result<String, StoreError> {
-        self.status(id).await?;
-        let files = self.files.clone();
-        let read = tokio::task::spawn_blocking(move || files.scene(id)).await;
-        // A job without its scene has just been deleted.
-        read.ok().and_then(Result::ok).ok_or(StoreError::NotFound)
-    }
-
-    /// The picture so far.
-    pub async fn preview(&self, id: JobId) -> Result<PreviewState, StoreError> {
-        if let Some(preview) = self.registry.get(id).and_then(|live| live.preview()) {
-            let encoded = tokio::task::spawn_blocking(move || preview.png()).await;
-            return encoded.ok().flatten().map(PreviewState::Ready).ok_or(StoreError::NotCommitted);
-        }
-        Ok(match self.artifact(id, "image.png").await? {
-            Ok((_, path)) => PreviewState::Final(path),
-            Err(state) => PreviewState::Nothing(state),
+    /// Begins to take an asset.
+    pub(crate) fn begin_upload(&self, owner: Owner) -> Result<Upload, StoreError> {
+        self.require_room()?;
+        self.assets.begin_upload(owner).map_err(|error| {
+            tracing::error!(%error, "an upload could not begin");
+            StoreError::NotCommitted
         })
+    }
+
+    /// The file of an asset and its size.
+    pub(crate) async fn asset(&self, owner: &Owner, sha256: String) -> Result<(PathBuf, u64), StoreError> {
+        let (assets, owner) = (self.assets.clone(), owner.clone());
+        let found = tokio::task::spawn_blocking(move || assets.find(&owner, &sha256)).await;
+        found.map_err(|_| StoreError::NotCommitted)??.ok_or(StoreError::NotFound)
+    }
+
+    /// What the scenes of an owner may refer to.
+    pub(crate) fn assets_of(&self, owner: Owner) -> OwnAssets {
+        self.assets.of(owner)
+    }
+
+    /// Whose token this is.
+    pub(crate) async fn owner_of(&self, token: &str) -> Result<Option<Owner>, StoreError> {
+        self.keys.owner_of(token).await
+    }
+
+    /// True once a key was made.
+    pub(crate) async fn has_keys(&self) -> Result<bool, StoreError> {
+        self.keys.exist().await
+    }
+
+    /// How many jobs wait and how many run.
+    pub(crate) async fn counts(&self) -> Result<(u32, u32), StoreError> {
+        self.store.read(query::counts).await
     }
 
     /// True once the service takes no more jobs.
@@ -289,7 +341,7 @@ impl Jobs {
 }
 
 /// Returns when something about this job, or an unknown number of jobs, is new.
-async fn heard_of(changes: &mut broadcast::Receiver<Change>, id: JobId) {
+pub(crate) async fn heard_of(changes: &mut broadcast::Receiver<Change>, id: JobId) {
     loop {
         match changes.recv().await {
             Ok(Change(other)) if other != id => {}
@@ -298,6 +350,13 @@ async fn heard_of(changes: &mut broadcast::Receiver<Change>, id: JobId) {
             Err(broadcast::error::RecvError::Closed) => std::future::pending().await,
         }
     }
+}
+
+/// The threads that render.
+fn render_pool(settings: &Settings) -> Result<rayon::ThreadPool, rayon::ThreadPoolBuildError> {
+    let threads = settings.threads.map_or(0, usize::from);
+    let name = |index| format!("render-{index}");
+    rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build()
 }
 
 fn lock_folder(settings: &Settings) -> Result<File, OpenError> {

@@ -1,49 +1,10 @@
-//! The statements: every reading and every change of the job tables.
+//! The statements that change jobs, and what they are about.
 
-use super::{Event, Failure, Job, JobId, JobState, StoreError};
-use rusqlite::types::Type;
-use rusqlite::{Connection, OptionalExtension, Row, named_params, params};
+use super::query::{parsed, state_of};
+use super::{Event, Failure, JobId, JobState, Milestone, Owner, StoreError};
+use rusqlite::{Connection, OptionalExtension, named_params, params};
 use serde_json::Value;
-
-/// Attempts that may die with the service before the job itself is blamed.
-const MAX_DEATHS: u32 = 3;
-
-const TABLES: &str = "
-CREATE TABLE IF NOT EXISTS jobs (
-    seq INTEGER PRIMARY KEY AUTOINCREMENT,
-    id TEXT NOT NULL UNIQUE,
-    state TEXT NOT NULL,
-    attempt INTEGER NOT NULL DEFAULT 0,
-    deaths INTEGER NOT NULL DEFAULT 0,
-    name TEXT NOT NULL,
-    width INTEGER NOT NULL,
-    height INTEGER NOT NULL,
-    created_ms INTEGER NOT NULL,
-    started_ms INTEGER,
-    finished_ms INTEGER,
-    rounds INTEGER NOT NULL DEFAULT 0,
-    error_estimate REAL,
-    stop_reason TEXT,
-    plan TEXT,
-    stats TEXT,
-    failure_code TEXT,
-    failure_detail TEXT
-) STRICT;
-CREATE INDEX IF NOT EXISTS jobs_by_state ON jobs (state, seq);
-CREATE TABLE IF NOT EXISTS artifacts (
-    job TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,
-    name TEXT NOT NULL,
-    attempt INTEGER NOT NULL,
-    sha256 TEXT NOT NULL,
-    PRIMARY KEY (job, name)
-) STRICT;
-CREATE TABLE IF NOT EXISTS idempotency (
-    key TEXT PRIMARY KEY,
-    fingerprint TEXT NOT NULL,
-    job TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE
-) STRICT;
-PRAGMA user_version = 1;
-";
+use std::collections::HashSet;
 
 /// A picture of a finished job, as a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,10 +21,26 @@ pub struct Artifact {
 #[derive(Clone, Debug)]
 pub(super) struct NewJob {
     pub id: JobId,
+    pub owner: Owner,
     pub name: String,
+    pub label: Option<String>,
     pub size: [u32; 2],
     pub created_ms: i64,
+    /// The scene, unless it is large enough for a file of its own.
+    pub scene: Option<String>,
+    pub bytes: u64,
+    /// What the scene refers to, by SHA-256.
+    pub assets: Vec<String>,
     pub idempotency: Option<IdempotencyKey>,
+}
+
+/// How many jobs may be unfinished.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct QueueLimits {
+    /// Of all owners, waiting.
+    pub queued: u32,
+    /// Of one owner that has a key, waiting or running.
+    pub unfinished: u32,
 }
 
 /// A client's own name for a request, and what the request was.
@@ -80,13 +57,26 @@ pub(super) struct Outcome {
     pub error_estimate: Option<f32>,
     pub stop_reason: Option<String>,
     pub stats: Option<Value>,
+    pub history: Vec<Milestone>,
     pub failure: Option<Failure>,
-    pub artifacts: Vec<Artifact>,
+    pub artifacts: Vec<NewArtifact>,
+}
+
+/// A picture to be recorded: with its bytes, unless they are in a file.
+#[derive(Clone, Debug)]
+pub(super) struct NewArtifact {
+    pub artifact: Artifact,
+    pub bytes: u64,
+    pub data: Option<Vec<u8>>,
 }
 
 /// Which jobs to list: newest first, at most `limit`, older than `before`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Page {
+    /// Only jobs of this owner.
+    pub owner: Owner,
+    /// Only jobs with this label.
+    pub label: Option<String>,
     /// Only jobs in this state.
     pub state: Option<JobState>,
     /// Only jobs submitted before the one at this position.
@@ -95,45 +85,87 @@ pub struct Page {
     pub limit: u32,
 }
 
-/// Whether a submission made a job or found the one that the same request had made.
+/// Whether a submission made a job, and how many wait before it, or found the one that the same request had made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Submitted {
-    New(JobId),
+    New(JobId, u32),
     Replayed(JobId),
 }
 
-pub(super) fn create_tables(db: &Connection) -> Result<(), rusqlite::Error> {
-    db.execute_batch(TABLES)
-}
-
-pub(super) fn insert(db: &Connection, job: &NewJob, max_queue: u32) -> Result<Submitted, StoreError> {
-    if let Some(known) = job.idempotency.as_ref().map(|key| find_key(db, key)).transpose()?.flatten() {
+pub(super) fn insert(db: &Connection, job: &NewJob, limits: QueueLimits) -> Result<Submitted, StoreError> {
+    if let Some(known) =
+        job.idempotency.as_ref().map(|key| find_key(db, &job.owner, key)).transpose()?.flatten()
+    {
         return Ok(Submitted::Replayed(known));
     }
-    let waiting: u32 =
-        db.query_row("SELECT count(*) FROM jobs WHERE state = 'queued'", [], |row| row.get(0))?;
-    if waiting >= max_queue {
-        return Err(StoreError::QueueFull(waiting));
+    let before = admit(db, &job.owner, limits)?;
+    db.prepare_cached(
+        "INSERT INTO jobs (id, state, owner, name, label, width, height, created_ms, bytes)
+         VALUES (?1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+    )?
+    .execute(params![
+        job.id.to_string(),
+        job.owner.as_str(),
+        job.name,
+        job.label,
+        job.size[0],
+        job.size[1],
+        job.created_ms,
+        job.bytes
+    ])?;
+    if let Some(scene) = &job.scene {
+        db.prepare_cached("INSERT INTO scenes (job, text) VALUES (?1, ?2)")?
+            .execute(params![job.id.to_string(), scene])?;
     }
-    db.execute(
-        "INSERT INTO jobs (id, state, name, width, height, created_ms) VALUES (?1, 'queued', ?2, ?3, ?4, ?5)",
-        params![job.id.to_string(), job.name, job.size[0], job.size[1], job.created_ms],
-    )?;
+    for sha256 in &job.assets {
+        db.execute(
+            "INSERT INTO job_assets (job, sha256) VALUES (?1, ?2)",
+            params![job.id.to_string(), sha256],
+        )?;
+        db.execute(
+            "UPDATE assets SET used_ms = ?3 WHERE owner = ?1 AND sha256 = ?2",
+            params![job.owner.as_str(), sha256, job.created_ms],
+        )?;
+    }
     if let Some(key) = &job.idempotency {
         db.execute(
             "INSERT INTO idempotency (key, fingerprint, job) VALUES (?1, ?2, ?3)",
-            params![key.key, key.fingerprint, job.id.to_string()],
+            params![job.owner.scoped(&key.key), key.fingerprint, job.id.to_string()],
         )?;
     }
-    Ok(Submitted::New(job.id))
+    Ok(Submitted::New(job.id, before))
+}
+
+/// How many jobs wait before a new one of this owner, if it may have one.
+fn admit(db: &Connection, owner: &Owner, limits: QueueLimits) -> Result<u32, StoreError> {
+    let queued: u32 = db
+        .prepare_cached("SELECT total(queued) FROM waiting")?
+        .query_row([], |row| Ok(row.get::<_, f64>(0)? as u32))?;
+    if queued >= limits.queued {
+        return Err(StoreError::QueueFull(queued));
+    }
+    let own: Option<u32> = db
+        .prepare_cached("SELECT queued + running FROM waiting WHERE owner = ?1")?
+        .query_row([owner.as_str()], |row| row.get(0))
+        .optional()?;
+    if !owner.is_anonymous() && own.unwrap_or(0) >= limits.unfinished {
+        return Err(StoreError::TooManyJobs(limits.unfinished));
+    }
+    Ok(queued)
 }
 
 /// The job that this key made before, if it did.
-pub(super) fn find_key(db: &Connection, key: &IdempotencyKey) -> Result<Option<JobId>, StoreError> {
+pub(super) fn find_key(
+    db: &Connection,
+    owner: &Owner,
+    key: &IdempotencyKey,
+) -> Result<Option<JobId>, StoreError> {
     let known = db
-        .query_row("SELECT fingerprint, job FROM idempotency WHERE key = ?1", [&key.key], |row| {
-            Ok((row.get::<_, String>(0)?, parsed::<JobId>(row, 1)?))
-        })
+        .query_row(
+            "SELECT fingerprint, job FROM idempotency WHERE key = ?1",
+            [owner.scoped(&key.key)],
+            |row| Ok((row.get::<_, String>(0)?, parsed::<JobId>(row, 1)?)),
+        )
         .optional()?;
     match known {
         Some((fingerprint, _)) if fingerprint != key.fingerprint => Err(StoreError::KeyReused),
@@ -184,7 +216,7 @@ pub(super) fn conclude(
     apply(db, id, event, Some(fence), now_ms)?;
     db.execute(
         "UPDATE jobs SET rounds = ?2, error_estimate = ?3, stop_reason = ?4, stats = ?5,
-             failure_code = ?6, failure_detail = ?7 WHERE id = ?1",
+             failure_code = ?6, failure_detail = ?7, history = ?8, bytes = bytes + ?9 WHERE id = ?1",
         params![
             id.to_string(),
             outcome.rounds,
@@ -193,27 +225,40 @@ pub(super) fn conclude(
             outcome.stats.as_ref().map(Value::to_string),
             outcome.failure.as_ref().map(|failure| &failure.code),
             outcome.failure.as_ref().map(|failure| &failure.detail),
+            serde_json::to_string(&outcome.history).ok(),
+            outcome.artifacts.iter().map(|new| new.bytes).sum::<u64>(),
         ],
     )?;
-    for artifact in &outcome.artifacts {
+    for NewArtifact { artifact, data, .. } in &outcome.artifacts {
         db.execute(
-            "INSERT INTO artifacts (job, name, attempt, sha256) VALUES (?1, ?2, ?3, ?4)",
-            params![id.to_string(), artifact.name, artifact.attempt, artifact.sha256],
+            "INSERT INTO artifacts (job, name, attempt, sha256, data) VALUES (?1, ?2, ?3, ?4, ?5)",
+            params![id.to_string(), artifact.name, artifact.attempt, artifact.sha256, data],
         )?;
     }
     Ok(())
 }
 
-/// Starts the job that has waited longest.
-pub(super) fn claim(db: &Connection, now_ms: i64) -> Result<Option<(JobId, u32)>, StoreError> {
+/// Starts the job that has waited longest of the owner for whom the fewest run.
+pub(super) fn claim(db: &Connection, now_ms: i64) -> Result<Option<Claim>, StoreError> {
     let next = db
-        .query_row("SELECT id FROM jobs WHERE state = 'queued' ORDER BY seq LIMIT 1", [], |row| {
-            parsed::<JobId>(row, 0)
-        })
+        .prepare_cached(
+            "SELECT id, owner FROM jobs WHERE seq = (
+                 SELECT (SELECT min(seq) FROM jobs WHERE owner = waiting.owner AND state = 'queued') AS first
+                 FROM waiting WHERE queued > 0 ORDER BY running, first LIMIT 1)",
+        )?
+        .query_row([], |row| Ok((parsed::<JobId>(row, 0)?, Owner::of(row.get::<_, String>(1)?))))
         .optional()?;
-    let Some(id) = next else { return Ok(None) };
+    let Some((id, owner)) = next else { return Ok(None) };
     let (_, attempt) = apply(db, id, Event::Start, None, now_ms)?;
-    Ok(Some((id, attempt)))
+    Ok(Some(Claim { id, attempt, owner }))
+}
+
+/// A job that has just been started.
+#[derive(Clone, Debug)]
+pub(super) struct Claim {
+    pub id: JobId,
+    pub attempt: u32,
+    pub owner: Owner,
 }
 
 /// Keeps the plan of a running attempt.
@@ -227,52 +272,25 @@ pub(super) fn record_plan(db: &Connection, id: JobId, fence: u32, plan: &Value) 
 
 /// Called on start: what still says `running` died with the last process. It waits again, or fails if
 /// it has taken the service down too often.
-pub(super) fn recover(db: &Connection, now_ms: i64) -> Result<usize, StoreError> {
+pub(super) fn recover(db: &Connection, max_deaths: u32, now_ms: i64) -> Result<usize, StoreError> {
     let dead: Vec<(JobId, u32, u32)> = db
         .prepare("SELECT id, attempt, deaths FROM jobs WHERE state = 'running' ORDER BY seq")?
         .query_map([], |row| Ok((parsed::<JobId>(row, 0)?, row.get(1)?, row.get(2)?)))?
         .collect::<Result<_, _>>()?;
     for &(id, attempt, deaths) in &dead {
         db.execute("UPDATE jobs SET deaths = deaths + 1 WHERE id = ?1", [id.to_string()])?;
-        if deaths + 1 < MAX_DEATHS {
+        if deaths + 1 < max_deaths {
             apply(db, id, Event::Requeue, Some(attempt), now_ms)?;
             continue;
         }
         let failure = Failure {
             code: "attempts_exhausted".into(),
-            detail: format!("The service died {MAX_DEATHS} times while it rendered this job."),
+            detail: format!("The service died {max_deaths} times while it rendered this job."),
         };
         let outcome = Outcome { failure: Some(failure), ..Outcome::default() };
         conclude(db, (id, attempt), Event::Fail, &outcome, now_ms)?;
     }
     Ok(dead.len())
-}
-
-pub(super) fn get(db: &Connection, id: JobId) -> Result<Option<Job>, StoreError> {
-    let job = db.query_row("SELECT * FROM jobs WHERE id = ?1", [id.to_string()], job_of).optional()?;
-    let Some(mut job) = job else { return Ok(None) };
-    job.artifacts = db
-        .prepare_cached("SELECT name, attempt, sha256 FROM artifacts WHERE job = ?1 ORDER BY name")?
-        .query_map([id.to_string()], |row| {
-            Ok(Artifact { name: row.get(0)?, attempt: row.get(1)?, sha256: row.get(2)? })
-        })?
-        .collect::<Result<_, _>>()?;
-    Ok(Some(job))
-}
-
-pub(super) fn list(db: &Connection, page: Page) -> Result<Vec<Job>, StoreError> {
-    let mut statement = db.prepare_cached(
-        "SELECT * FROM jobs WHERE seq < ?1 AND (?2 IS NULL OR state = ?2) ORDER BY seq DESC LIMIT ?3",
-    )?;
-    let before = page.before.unwrap_or(i64::MAX);
-    let rows = statement.query_map(params![before, page.state.map(JobState::as_str), page.limit], job_of)?;
-    Ok(rows.collect::<Result<_, _>>()?)
-}
-
-/// How many jobs are before this one in the queue.
-pub(super) fn queue_position(db: &Connection, seq: i64) -> Result<u32, StoreError> {
-    let count = "SELECT count(*) FROM jobs WHERE state = 'queued' AND seq < ?1";
-    Ok(db.query_row(count, [seq], |row| row.get(0))?)
 }
 
 pub(super) fn delete(db: &Connection, id: JobId) -> Result<(), StoreError> {
@@ -283,52 +301,7 @@ pub(super) fn delete(db: &Connection, id: JobId) -> Result<(), StoreError> {
 }
 
 /// The names of all jobs, to tell folders that belong to one from folders that were left behind.
-pub(super) fn ids(db: &Connection) -> Result<Vec<String>, StoreError> {
+pub(super) fn ids(db: &Connection) -> Result<HashSet<String>, StoreError> {
     let mut statement = db.prepare("SELECT id FROM jobs")?;
     Ok(statement.query_map([], |row| row.get(0))?.collect::<Result<_, _>>()?)
-}
-
-fn job_of(row: &Row<'_>) -> Result<Job, rusqlite::Error> {
-    let failure = row.get::<_, Option<String>>("failure_code")?.zip(row.get("failure_detail")?);
-    Ok(Job {
-        seq: row.get("seq")?,
-        id: parsed(row, row.as_ref().column_index("id")?)?,
-        state: state_of(row, row.as_ref().column_index("state")?)?,
-        attempt: row.get("attempt")?,
-        deaths: row.get("deaths")?,
-        name: row.get("name")?,
-        size: [row.get("width")?, row.get("height")?],
-        created_ms: row.get("created_ms")?,
-        started_ms: row.get("started_ms")?,
-        finished_ms: row.get("finished_ms")?,
-        rounds: row.get("rounds")?,
-        error_estimate: row.get("error_estimate")?,
-        stop_reason: row.get("stop_reason")?,
-        plan: json_of(row, "plan")?,
-        stats: json_of(row, "stats")?,
-        failure: failure.map(|(code, detail)| Failure { code, detail }),
-        artifacts: Vec::new(),
-    })
-}
-
-fn json_of(row: &Row<'_>, column: &str) -> Result<Option<Value>, rusqlite::Error> {
-    let text: Option<String> = row.get(column)?;
-    Ok(text.and_then(|text| serde_json::from_str(&text).ok()))
-}
-
-fn state_of(row: &Row<'_>, column: usize) -> Result<JobState, rusqlite::Error> {
-    let text: String = row.get(column)?;
-    let found = JobState::ALL.into_iter().find(|state| state.as_str() == text);
-    found.ok_or_else(|| unreadable(column, format!("unknown state {text:?}").into()))
-}
-
-fn parsed<T>(row: &Row<'_>, column: usize) -> Result<T, rusqlite::Error>
-where
-    T: std::str::FromStr<Err: std::error::Error + Send + Sync + 'static>,
-{
-    row.get::<_, String>(column)?.parse().map_err(|error: T::Err| unreadable(column, error.into()))
-}
-
-fn unreadable(column: usize, error: Box<dyn std::error::Error + Send + Sync>) -> rusqlite::Error {
-    rusqlite::Error::FromSqlConversionFailure(column, Type::Text, error)
 }

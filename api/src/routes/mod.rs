@@ -1,5 +1,8 @@
 //! Every address of the service, on one screen.
 
+mod access;
+mod assets;
+mod events;
 mod health;
 mod page;
 mod pictures;
@@ -8,58 +11,62 @@ mod renders;
 mod scenes;
 
 use crate::AppState;
+use crate::openapi;
 use crate::problem::Problem;
+use crate::request::{answer_panic, cors, harden, observe};
 use axum::Router;
-use axum::extract::Request;
-use axum::http::{HeaderValue, header};
-use axum::middleware::{Next, from_fn};
-use axum::response::{IntoResponse, Response};
-use axum::routing::{get, post};
-use std::any::Any;
+use axum::middleware::{from_fn, from_fn_with_state};
+use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
-use tower_http::trace::TraceLayer;
+use utoipa::openapi::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
 
 /// The service, without a listener.
 pub fn router(state: AppState) -> Router {
-    Router::new()
-        .route("/v1/renders", post(renders::create_render).get(renders::list_renders))
-        .route("/v1/renders/{id}", get(renders::get_render).delete(renders::delete_render))
-        .route("/v1/renders/{id}/cancel", post(renders::cancel_render))
-        .route("/v1/renders/{id}/scene.json", get(renders::get_render_scene))
-        .route("/v1/renders/{id}/image.png", get(pictures::get_image_png))
-        .route("/v1/renders/{id}/image.exr", get(pictures::get_image_exr))
-        .route("/v1/renders/{id}/preview.png", get(pictures::get_preview))
-        .route("/v1/renders/{id}/layers/{file}", get(pictures::get_layer))
-        .route("/v1/plans", post(plans::create_plan))
-        .route("/v1/schema", get(scenes::get_schema))
-        .route("/v1/scenes", get(scenes::list_scenes))
-        .route("/v1/scenes/{name}", get(scenes::get_scene))
-        .route("/v1/scenes/{name}/picture.png", get(scenes::get_scene_picture))
-        .route("/healthz", get(health::live))
-        .route("/readyz", get(health::ready))
+    let cors = cors(&state.settings);
+    let (described, _) = described().split_for_parts();
+    described
+        .route("/openapi.json", get(openapi::get_document))
+        .route("/docs", get(page::docs))
         .route("/", get(page::index))
         .route("/{file}", get(page::file))
         .fallback(async || Problem::not_found("There is nothing at this address."))
         .method_not_allowed_fallback(async || Problem::method_not_allowed())
-        .with_state(state)
         .layer(CatchPanicLayer::custom(answer_panic))
+        .layer(cors)
         .layer(from_fn(harden))
-        .layer(TraceLayer::new_for_http())
+        .layer(from_fn_with_state(state.clone(), observe))
+        .with_state(state)
 }
 
-fn answer_panic(panic: Box<dyn Any + Send>) -> Response {
-    let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-    Problem::internal(text.unwrap_or("panic without text")).into_response()
+/// The addresses for programs; what is said of them is written at their handlers.
+fn described() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(routes!(renders::create_render, renders::list_renders))
+        .routes(routes!(renders::get_render, renders::delete_render))
+        .routes(routes!(renders::cancel_render))
+        .routes(routes!(renders::get_render_scene))
+        .routes(routes!(events::get_events))
+        .routes(routes!(pictures::get_image_png))
+        .routes(routes!(pictures::get_image_exr))
+        .routes(routes!(pictures::get_preview))
+        .routes(routes!(pictures::get_error_map))
+        .routes(routes!(pictures::get_chart))
+        .routes(routes!(pictures::get_layer))
+        .routes(routes!(plans::create_plan))
+        .routes(routes!(assets::put_asset, assets::get_asset))
+        .routes(routes!(scenes::get_schema))
+        .routes(routes!(scenes::list_scenes))
+        .routes(routes!(scenes::get_scene))
+        .routes(routes!(scenes::get_scene_picture))
+        .routes(routes!(access::get_session, access::create_session, access::delete_session))
+        .routes(routes!(health::live))
+        .routes(routes!(health::ready))
+        .routes(routes!(health::metrics))
 }
 
-/// Headers that every answer carries: browsers guess no types and run nothing but the page's own files.
-async fn harden(request: Request, next: Next) -> Response {
-    const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
-        connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-    let mut response = next.run(request).await;
-    let headers = response.headers_mut();
-    headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY));
-    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
-    headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
-    response
+/// What is said of the addresses.
+pub(crate) fn description() -> OpenApi {
+    described().into_openapi()
 }

@@ -8,7 +8,7 @@ use axum::response::{IntoResponse, Response};
 use sha2::{Digest, Sha256};
 
 /// Name, type and content of each file.
-const FILES: [(&str, &str, &str); 8] = [
+const FILES: [(&str, &str, &str); 14] = [
     ("index.html", "text/html; charset=utf-8", include_str!("../../web/index.html")),
     ("page.css", "text/css; charset=utf-8", include_str!("../../web/page.css")),
     ("page.js", "text/javascript; charset=utf-8", include_str!("../../web/page.js")),
@@ -16,12 +16,23 @@ const FILES: [(&str, &str, &str); 8] = [
     ("sketch.js", "text/javascript; charset=utf-8", include_str!("../../web/sketch.js")),
     ("chart.js", "text/javascript; charset=utf-8", include_str!("../../web/chart.js")),
     ("nephroid.js", "text/javascript; charset=utf-8", include_str!("../../web/nephroid.js")),
+    ("editor.js", "text/javascript; charset=utf-8", include_str!("../../web/editor.js")),
+    ("complete.js", "text/javascript; charset=utf-8", include_str!("../../web/complete.js")),
+    ("layers.js", "text/javascript; charset=utf-8", include_str!("../../web/layers.js")),
+    ("docs.html", "text/html; charset=utf-8", include_str!("../../web/docs.html")),
+    ("docs.css", "text/css; charset=utf-8", include_str!("../../web/docs.css")),
+    ("docs.js", "text/javascript; charset=utf-8", include_str!("../../web/docs.js")),
     ("icon.svg", "image/svg+xml", include_str!("../../web/icon.svg")),
 ];
 
 /// `GET /`
 pub(super) async fn index(headers: HeaderMap) -> Result<Response, Problem> {
     file(Path("index.html".into()), headers).await
+}
+
+/// `GET /docs`
+pub(super) async fn docs(headers: HeaderMap) -> Result<Response, Problem> {
+    file(Path("docs.html".into()), headers).await
 }
 
 /// `GET /{file}`

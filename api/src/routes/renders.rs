@@ -1,11 +1,12 @@
 //! `/v1/renders`: submit, list, look, cancel, delete.
 
 use crate::AppState;
+use crate::access::Caller;
 use crate::body::read_json_text;
-use crate::jobs::service::{Status, Submission};
-use crate::jobs::{JobId, Page};
+use crate::jobs::service::{Accepted, Status, Submission};
+use crate::jobs::{Answer, JobId, Page};
 use crate::problem::Problem;
-use crate::wire::{CreateQuery, JobList, JobView, ListQuery, job_path};
+use crate::wire::{CreateQuery, JobList, JobView, ListQuery, Validated, job_path};
 use axum::body::Body;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Path, Query, State};
@@ -24,10 +25,31 @@ const MAX_WAIT_S: u64 = 30;
 const DEFAULT_PAGE: u32 = 20;
 const MAX_PAGE: u32 = 100;
 const MAX_KEY_LENGTH: usize = 255;
+const MAX_LABEL: usize = 200;
 
-/// `POST /v1/renders`
+/// Submit a scene
+///
+/// The answer comes once the job is on disk; from then on it survives crashes.
+#[utoipa::path(
+    post, path = "/v1/renders", tag = "renders", security(("key" = [])),
+    params(
+        CreateQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=n`: hold the answer up to n seconds, at most 30", example = "wait=10"),
+        ("Idempotency-Key" = Option<String>, Header, max_length = 255, description = "The same key with the same scene gives the first job again")
+    ),
+    request_body(content = crate::openapi::Scene, content_type = "application/json"),
+    responses(
+        (status = ACCEPTED, description = "The job waits or runs", body = JobView, headers(
+            ("Location" = String, description = "Address of the job"),
+            ("Retry-After" = u32, description = "Seconds after which to look again"),
+            ("Idempotent-Replayed" = Option<String>, description = "`true` if the job was there"))),
+        (status = OK, description = "The job is done, or the scene was only validated", body = Submitted),
+        (status = 400), (status = 408), (status = 413), (status = 415), (status = 422), (status = 507)
+    )
+)]
 pub(super) async fn create_render(
     State(app): State<AppState>,
+    caller: Caller,
     query: Result<Query<CreateQuery>, QueryRejection>,
     headers: HeaderMap,
     body: Body,
@@ -36,19 +58,29 @@ pub(super) async fn create_render(
     if app.jobs.is_draining() {
         return Err(Problem::draining());
     }
+    if query.label.as_ref().is_some_and(|label| label.chars().count() > MAX_LABEL) {
+        return Err(Problem::bad_request(format!("`label` must have at most {MAX_LABEL} characters.")));
+    }
     let idempotency_key = idempotency_key(&headers)?;
     let text = read_json_text(&headers, body, app.settings.max_body).await?;
+    let assets = app.jobs.assets_of(caller.0.clone());
     if query.validate_only {
-        let plan = app.planner.plan(text).await?.report();
-        return Ok(json_response(StatusCode::OK, &serde_json::json!({ "valid": true, "plan": plan })));
+        let plan = app.planner.plan(text, assets).await?.report();
+        return Ok(json_response(StatusCode::OK, &Validated { valid: true, plan }));
     }
-    let (text, scene) = app.planner.read(text).await?;
-    let (id, replayed) = app.jobs.submit(Submission { text, scene, idempotency_key }).await?;
+    let (text, scene) = app.planner.read(text, assets).await?;
+    let owner = caller.0.clone();
+    let submission = Submission { text, scene, owner, label: query.label, idempotency_key };
+    let Accepted { mut status, replayed } = app.jobs.submit(submission).await?;
+    let id = status.job.id;
+    tracing::info!(job = %id, replayed, "accepted");
+    if !replayed {
+        app.metrics.job("accepted");
+    }
     let wait = preferred_wait(&headers);
-    let status = match wait {
-        Some(wait) => app.jobs.status_within(id, wait).await?,
-        None => app.jobs.status(id).await?,
-    };
+    if let Some(wait) = wait {
+        status = app.jobs.status_within(&caller.0, id, wait).await?;
+    }
     let mut response = answer_created(id, status);
     if let Some(applied) = wait.and_then(|wait| format!("wait={}", wait.as_secs()).parse().ok()) {
         response.headers_mut().insert(PREFERENCE_APPLIED, applied);
@@ -59,9 +91,23 @@ pub(super) async fn create_render(
     Ok(response)
 }
 
-/// `GET /v1/renders`
+/// What a submission that is answered with 200 gives.
+#[derive(utoipa::ToSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "it only describes answers")]
+enum Submitted {
+    Done(Box<JobView>),
+    Validated(Validated),
+}
+
+/// List jobs, newest first
+#[utoipa::path(
+    get, path = "/v1/renders", tag = "renders", security(("key" = [])), params(ListQuery),
+    responses((status = OK, body = JobList), (status = 400))
+)]
 pub(super) async fn list_renders(
     State(app): State<AppState>,
+    caller: Caller,
     query: Result<Query<ListQuery>, QueryRejection>,
 ) -> Result<Response, Problem> {
     let Query(query) = query.map_err(|error| Problem::bad_request(error.body_text()))?;
@@ -71,7 +117,7 @@ pub(super) async fn list_renders(
     }
     let before = query.cursor.as_deref().map(read_cursor).transpose()?;
     // One more than asked for tells whether there is another page.
-    let page = Page { state: query.state, before, limit: limit + 1 };
+    let page = Page { owner: caller.0, label: query.label, state: query.state, before, limit: limit + 1 };
     let mut jobs = app.jobs.list(page).await?;
     let more = jobs.len() > limit as usize;
     jobs.truncate(limit as usize);
@@ -80,46 +126,90 @@ pub(super) async fn list_renders(
     Ok(json_response(StatusCode::OK, &list))
 }
 
-/// `GET /v1/renders/{id}`
+/// A job as it is now
+#[utoipa::path(
+    get, path = "/v1/renders/{id}", tag = "renders", security(("key" = [])),
+    params(("id" = String, Path, format = Uuid), ("If-None-Match" = Option<String>, Header)),
+    responses(
+        (status = OK, body = JobView, headers(
+            ("ETag" = String), ("Retry-After" = Option<u32>, description = "While the job is not done"))),
+        (status = 304), (status = 404), (status = 410)
+    )
+)]
 pub(super) async fn get_render(
     State(app): State<AppState>,
+    caller: Caller,
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let status = app.jobs.status(parse_id(&id)?).await?;
-    let retry_after = retry_after_s(&status);
-    let mut response = json_response(StatusCode::OK, &JobView::full(status));
-    if let Some(seconds) = retry_after {
+    let answer = app.jobs.answer(&caller.0, parse_id(&id)?, write_answer).await?;
+    let head = [
+        (header::CONTENT_TYPE, "application/json"),
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::ETAG, answer.etag.as_str()),
+    ];
+    let mut response = (head, answer.body.clone()).into_response();
+    if let Some(seconds) = answer.retry_after_s {
         response.headers_mut().insert(header::RETRY_AFTER, seconds.into());
     }
     Ok(not_modified(&headers, response))
 }
 
-/// `GET /v1/renders/{id}/scene.json`
+fn write_answer(status: Status) -> Answer {
+    let retry_after_s = retry_after_s(&status);
+    // A job has nothing in it that JSON cannot hold.
+    let body = serde_json::to_vec(&JobView::full(status)).unwrap_or_default();
+    Answer { etag: etag_of(&body), body: body.into(), retry_after_s }
+}
+
+/// The scene of a job, as it was sent
+#[utoipa::path(
+    get, path = "/v1/renders/{id}/scene.json", tag = "renders", security(("key" = [])),
+    params(("id" = String, Path, format = Uuid)),
+    responses((status = OK, body = crate::openapi::Scene), (status = 404), (status = 410))
+)]
 pub(super) async fn get_render_scene(
     State(app): State<AppState>,
+    caller: Caller,
     Path(id): Path<String>,
 ) -> Result<Response, Problem> {
-    let scene = app.jobs.scene(parse_id(&id)?).await?;
+    let scene = app.jobs.scene(&caller.0, parse_id(&id)?).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], scene).into_response())
 }
 
-/// `POST /v1/renders/{id}/cancel`
+/// Stop a job; harmless if it is done
+#[utoipa::path(
+    post, path = "/v1/renders/{id}/cancel", tag = "renders", security(("key" = [])),
+    params(("id" = String, Path, format = Uuid)),
+    responses((status = OK, body = JobView), (status = 404), (status = 410))
+)]
 pub(super) async fn cancel_render(
     State(app): State<AppState>,
+    caller: Caller,
     Path(id): Path<String>,
 ) -> Result<Response, Problem> {
     let id = parse_id(&id)?;
-    app.jobs.cancel(id).await?;
-    Ok(json_response(StatusCode::OK, &JobView::full(app.jobs.status(id).await?)))
+    if app.jobs.cancel(&caller.0, id).await? {
+        tracing::info!(job = %id, "cancelled");
+        app.metrics.job("cancelled");
+    }
+    Ok(json_response(StatusCode::OK, &JobView::full(app.jobs.status(&caller.0, id).await?)))
 }
 
-/// `DELETE /v1/renders/{id}`
+/// Stop a job and forget it with its pictures
+#[utoipa::path(
+    delete, path = "/v1/renders/{id}", tag = "renders", security(("key" = [])),
+    params(("id" = String, Path, format = Uuid)),
+    responses((status = NO_CONTENT), (status = 404), (status = 410))
+)]
 pub(super) async fn delete_render(
     State(app): State<AppState>,
+    caller: Caller,
     Path(id): Path<String>,
 ) -> Result<StatusCode, Problem> {
-    app.jobs.delete(parse_id(&id)?).await?;
+    let id = parse_id(&id)?;
+    app.jobs.delete(&caller.0, id).await?;
+    tracing::info!(job = %id, "deleted");
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -133,14 +223,19 @@ pub(super) fn json_response(status: StatusCode, body: &impl serde::Serialize) ->
     let Ok(body) = serde_json::to_string(body) else {
         return Problem::internal("an answer could not be written as JSON").into_response();
     };
-    let digest = Sha256::digest(body.as_bytes());
-    let tag: String = digest.iter().take(16).map(|byte| format!("{byte:02x}")).collect();
+    let etag = etag_of(body.as_bytes());
     let head = [
         (header::CONTENT_TYPE, "application/json".to_owned()),
         (header::CACHE_CONTROL, "no-cache".to_owned()),
-        (header::ETAG, format!("\"{tag}\"")),
+        (header::ETAG, etag),
     ];
     (status, head, body).into_response()
+}
+
+fn etag_of(body: &[u8]) -> String {
+    let digest = Sha256::digest(body);
+    let tag: String = digest.iter().take(16).map(|byte| format!("{byte:02x}")).collect();
+    format!("\"{tag}\"")
 }
 
 /// The answer, or 304 if the client has it already.
@@ -171,10 +266,18 @@ fn answer_created(id: JobId, status: Status) -> Response {
     response
 }
 
-/// When to look again; `None` once the job is done.
+/// When to look again; `None` once the job is done. A running job is asked for when a good part of what is left
+/// should have been made, by the speed at which it has advanced.
 fn retry_after_s(status: &Status) -> Option<u32> {
-    let waiting_before = status.queue_position.unwrap_or(0);
-    (!status.job.state.is_done()).then(|| (1 + waiting_before / 4).min(30))
+    if status.job.state.is_done() {
+        return None;
+    }
+    let Some(progress) = status.progress else {
+        return Some((1 + status.queue_position.unwrap_or(0) / 4).min(30));
+    };
+    let fraction = f64::from(progress.fraction);
+    let left = if fraction > 0.0 { progress.seconds * (1.0 - fraction) / fraction } else { 1.0 };
+    Some((left / 4.0).ceil().clamp(1.0, 30.0) as u32)
 }
 
 fn preferred_wait(headers: &HeaderMap) -> Option<Duration> {

@@ -1,0 +1,127 @@
+//! Clients that mean harm, or do it.
+
+use crate::bad_input::peak_memory_kib;
+use crate::server::{Server, endless, quick, scene, until};
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+
+async fn connect(server: &Server) -> TcpStream {
+    TcpStream::connect(server.base.strip_prefix("http://").unwrap()).await.unwrap()
+}
+
+#[tokio::test]
+async fn connections_that_dawdle_are_closed_and_hold_nobody_up() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &["--head-time", "2s"]);
+    let mut slow = Vec::new();
+    for _ in 0..300 {
+        let mut stream = connect(&server).await;
+        stream.write_all(b"GET /healthz HTTP/1.1\r\nhost: x\r\nx-slow: ").await.unwrap();
+        slow.push(stream);
+    }
+    assert_eq!(server.get("/healthz").await.status(), StatusCode::OK);
+    for mut stream in slow {
+        // The answer, if there is one, and the end of the connection.
+        let mut rest = Vec::new();
+        let read = tokio::time::timeout(crate::server::DEADLINE, stream.read_to_end(&mut rest)).await;
+        assert!(read.is_ok(), "the connection stays open");
+    }
+}
+
+#[tokio::test]
+async fn more_connections_than_may_be_wait_their_turn() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &["--connections", "2"]);
+    let idle = [connect(&server).await, connect(&server).await];
+    let waiting = tokio::spawn({
+        let (client, url) = (reqwest::Client::new(), server.url("/healthz"));
+        async move { client.get(url).send().await.unwrap().status() }
+    });
+    drop(idle);
+    assert_eq!(waiting.await.unwrap(), StatusCode::OK);
+}
+
+#[tokio::test]
+async fn nesting_without_end_is_refused() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &[]);
+    for text in ["[".repeat(1_000_000), format!("{}1{}", "{\"a\":".repeat(100_000), "}".repeat(100_000))] {
+        let answer = server.post("/v1/renders", text).await;
+        assert!(answer.status().is_client_error(), "{}", answer.status());
+        let problem: Value = answer.json().await.unwrap();
+        assert!(problem["detail"].as_str().unwrap().contains("nested"), "{problem:#}");
+    }
+}
+
+#[tokio::test]
+async fn ten_thousand_requests_at_once_are_answered_in_bounded_memory() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &["--queue", "50"]);
+    server.submit(&endless()).await;
+    let before = peak_memory_kib(&server);
+    let body = scene([16, 12], 1).to_string();
+    let mut tasks = tokio::task::JoinSet::new();
+    for worker in 0..200 {
+        let (client, url, body) = (server.client.clone(), server.url(""), body.clone());
+        tasks.spawn(async move {
+            let mut refused = 0;
+            for request in 0..50 {
+                let answer = if (worker + request) % 4 == 0 {
+                    client
+                        .post(format!("{url}/v1/renders"))
+                        .header("content-type", "application/json")
+                        .body(body.clone())
+                } else {
+                    client.get(format!("{url}/v1/renders?limit=3"))
+                };
+                let status = answer.send().await.unwrap().status();
+                assert!(status.is_success() || status == StatusCode::TOO_MANY_REQUESTS, "{status}");
+                refused += u32::from(status == StatusCode::TOO_MANY_REQUESTS);
+            }
+            refused
+        });
+    }
+    let refused: u32 = tasks.join_all().await.into_iter().sum();
+    assert!(refused > 0, "the queue has a bound");
+    let grown = peak_memory_kib(&server) - before;
+    assert!(grown < 200 * 1024, "{grown} KiB");
+    assert_eq!(server.get("/readyz").await.status(), StatusCode::OK);
+}
+
+#[tokio::test]
+async fn every_limit_of_a_scene_is_told_with_its_number() {
+    let data = tempfile::tempdir().unwrap();
+    let limits =
+        ["--max-primitives", "1", "--max-lights", "1", "--max-memory", "300M", "--max-photons", "1000"];
+    let server = Server::start(data.path(), &limits);
+    let refused = async |path: &str, scene: &Value| -> Value {
+        let answer = server.post(path, scene.to_string()).await;
+        assert_eq!(answer.status(), StatusCode::UNPROCESSABLE_ENTITY);
+        answer.json().await.unwrap()
+    };
+    let problem = refused("/v1/renders", &quick()).await;
+    assert_eq!((&problem["errors"][0]["pointer"], &problem["limit"]), (&json!("/objects"), &json!(1)));
+    let mut alone = quick();
+    alone["objects"].as_array_mut().unwrap().truncate(1);
+    alone["lights"] = json!([
+        { "type": "point", "position": [0, 3, 0], "intensity": [1, 1, 1] },
+        { "type": "point", "position": [1, 3, 0], "intensity": [1, 1, 1] }
+    ]);
+    let problem = refused("/v1/renders", &alone).await;
+    assert_eq!((&problem["errors"][0]["pointer"], &problem["limit"]), (&json!("/lights"), &json!(1)));
+    alone["lights"].as_array_mut().unwrap().truncate(1);
+    alone["image"] = json!({ "width": 3000, "height": 2000 });
+    let problem = refused("/v1/renders", &alone).await;
+    assert!(problem["detail"].as_str().unwrap().contains("memory"), "{problem:#}");
+
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &["--max-photons", "1000"]);
+    let answer = server.post("/v1/plans", quick().to_string()).await;
+    assert_eq!(answer.status(), StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(answer.text().await.unwrap().contains("photons"));
+    let id = server.submit(&quick()).await;
+    let job = until(async || Some(server.job(&id).await).filter(|job| job["done"] == true)).await;
+    assert_eq!(job["error"]["code"], "limit_exceeded", "{job:#}");
+}
