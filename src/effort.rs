@@ -62,6 +62,22 @@ impl Effort {
         self.samples.get(pixel).map_or(1, |&n| u32::from(n))
     }
 
+    /// More eye samples for the pixels that the first of all found to need them most. Of a number of samples in
+    /// proportion to the need, with a mean of 0.3, pixels get what goes beyond the one they had: in the time that costs,
+    /// about a tenth of a round's, the error falls most (tried from 0.1 to 1.5 on a glass ball and a ring).
+    #[must_use]
+    pub fn second_look(measured: &Measured<'_>, key: u64) -> Self {
+        const MEAN: f32 = 0.3;
+        let wanted = wanted_samples(measured);
+        let mean = wanted.iter().sum::<f32>() / wanted.len().max(1) as f32;
+        let scale = if mean > 0.0 { MEAN / mean } else { 0.0 };
+        let more = wanted.iter().enumerate().map(|(i, w)| {
+            let missing = (w * scale - 1.0).clamp(0.0, MOST_GROWTH);
+            (missing + dither(key, i)).floor() as u8
+        });
+        Self { photon_shift: 0, samples: more.collect() }
+    }
+
     /// Decides the next rounds' effort. `key` decides the rounding of fractions of a sample.
     #[must_use]
     pub fn decide(measured: &Measured<'_>, most_shift: u32, key: u64) -> Self {
@@ -100,12 +116,16 @@ fn wanted_samples(measured: &Measured<'_>) -> Vec<f32> {
     (0..per_sample.len()).map(|i| (around(i) / measured.rays_per_sample.max(1.0)).sqrt()).collect()
 }
 
+/// A number in [0, 1) for a pixel.
+fn dither(key: u64, pixel: usize) -> f32 {
+    (hash(key, pixel as u64) >> 40) as f32 / (1_u64 << 24) as f32
+}
+
 /// Samples of each pixel. Fractions of a sample are rounded up as often as they are large.
 fn samples(wanted: &[f32], had: &[u32], scale: f32, key: u64) -> Vec<u8> {
     let round = |(i, (w, &had)): (usize, (&f32, &u32))| {
-        let dither = (hash(key, i as u64) >> 40) as f32 / (1_u64 << 24) as f32;
         let most = MOST_SAMPLES.min(MOST_GROWTH * had.max(1) as f32);
-        ((w * scale).clamp(LEAST_SAMPLES, most) + dither).floor() as u8
+        ((w * scale).clamp(LEAST_SAMPLES, most) + dither(key, i)).floor() as u8
     };
     wanted.iter().zip(had).enumerate().map(round).collect()
 }

@@ -1,5 +1,9 @@
 //! The film: one layer per class of paths and half, summed over rounds.
 
+mod loans;
+
+pub use loans::Loan;
+
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::scene::Caustics;
@@ -52,6 +56,10 @@ pub struct PixelMeans {
     pub irradiance: [Vec3; 2],
     /// Radiance of the pixel per irradiance of its footprint.
     pub gain: Vec3,
+    /// The part of the caustic class that is borrowed from pixels beside it, in each half.
+    pub borrowed: [Vec3; 2],
+    /// Half of what the halves' difference of `borrowed` owes to the places of their eye samples.
+    pub coverage: Vec3,
 }
 
 impl PixelMeans {
@@ -128,7 +136,7 @@ impl PixelSums {
             means.add(PathClass::Caustic, gain * half.irradiance * per_photon);
             means
         });
-        PixelMeans { halves, irradiance, gain }
+        PixelMeans { halves, irradiance, gain, ..PixelMeans::default() }
     }
 
     /// The class that holds a number that is not finite, if any.
@@ -147,11 +155,18 @@ impl PixelSums {
 pub struct RoundFilm {
     width: u32,
     pixels: Vec<PixelSums>,
+    loans: Vec<Loan>,
 }
 
 impl RoundFilm {
     pub(crate) fn new(width: u32, height: u32) -> Self {
-        Self { width, pixels: vec![PixelSums::default(); width as usize * height as usize] }
+        let pixels = vec![PixelSums::default(); width as usize * height as usize];
+        Self { width, pixels, loans: Vec::new() }
+    }
+
+    /// Adds what a tile's pixels borrow.
+    pub(crate) fn lend(&mut self, loans: &[Loan]) {
+        self.loans.extend_from_slice(loans);
     }
 
     /// Puts a tile's pixels, row by row, at (x, y).
@@ -182,6 +197,8 @@ pub struct Film {
     /// Sum of the rounds' photon weights.
     photon_weight: f32,
     pixels: Vec<PixelSums>,
+    /// What pixels at borders borrow, in the order of borrowers and lenders.
+    loans: Vec<Loan>,
 }
 
 impl Film {
@@ -189,7 +206,7 @@ impl Film {
     #[must_use]
     pub fn new(width: u32, height: u32, caustics: Caustics) -> Self {
         let pixels = vec![PixelSums::default(); width as usize * height as usize];
-        Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels }
+        Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels, loans: Vec::new() }
     }
 
     /// Bytes a film of this size holds.
@@ -199,9 +216,19 @@ impl Film {
     }
 
     /// Adds the next round, whose photons count `photon_weight` times those of the first.
-    pub fn add_round(&mut self, mut round: RoundFilm, photon_weight: f32) {
+    pub fn add_round(&mut self, round: RoundFilm, photon_weight: f32) {
         self.rounds += 1;
+        self.add(round, photon_weight);
+    }
+
+    /// Adds eye samples to the last round.
+    pub fn add_samples(&mut self, samples: RoundFilm) {
+        self.add(samples, 0.0);
+    }
+
+    fn add(&mut self, mut round: RoundFilm, photon_weight: f32) {
         self.photon_weight += photon_weight;
+        Loan::merge(&mut self.loans, &round.loans);
         for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
             pixel.weigh_photons(photon_weight, self.caustics);
             sum.add(pixel);
@@ -210,7 +237,38 @@ impl Film {
 
     /// Means of every pixel, row by row.
     pub fn means(&self) -> impl Iterator<Item = PixelMeans> + '_ {
-        self.pixels.iter().map(|pixel| pixel.means(self.photon_weight, self.caustics))
+        let mut loans = self.loans.as_slice();
+        self.pixels.iter().enumerate().map(move |(i, pixel)| {
+            let mut means = pixel.means(self.photon_weight, self.caustics);
+            let mine = loans.iter().take_while(|loan| loan.borrower as usize == i).count();
+            let (mine, rest) = loans.split_at(mine);
+            loans = rest;
+            mine.iter().for_each(|loan| self.borrow(&mut means, loan));
+            means
+        })
+    }
+
+    fn borrow(&self, means: &mut PixelMeans, loan: &Loan) {
+        let lender = self.pixels[loan.lender as usize].means(self.photon_weight, self.caustics);
+        let gain = self.gain(loan);
+        for (half, (gain, irradiance)) in gain.into_iter().zip(lender.irradiance).enumerate() {
+            means.borrowed[half] += gain * irradiance;
+            means.halves[half].add(PathClass::Caustic, gain * irradiance);
+        }
+        means.coverage += 0.25 * (gain[0] - gain[1]) * (lender.irradiance[0] + lender.irradiance[1]);
+    }
+
+    /// The borrower's mean radiance per irradiance of the lender's footprint, in each half.
+    #[must_use]
+    pub fn gain(&self, loan: &Loan) -> [Vec3; 2] {
+        let per_sample = 1.0 / self.pixels[loan.borrower as usize].samples.max(1) as f32;
+        loan.gain.map(|gain| gain * per_sample)
+    }
+
+    /// What pixels at borders borrow.
+    #[must_use]
+    pub fn loans(&self) -> &[Loan] {
+        &self.loans
     }
 
     /// The estimator of the caustics.
@@ -269,6 +327,9 @@ impl Film {
         for pixel in &self.pixels {
             pixel.visit(|word| bytes.extend(word.to_le_bytes()));
         }
+        for loan in &self.loans {
+            loan.to_words().into_iter().for_each(|word| bytes.extend(word.to_le_bytes()));
+        }
         bytes
     }
 
@@ -278,14 +339,22 @@ impl Film {
         let mut film = Self::new(self.width, self.height, self.caustics);
         let (rounds, rest) = bytes.split_first_chunk::<4>()?;
         let (photon_weight, values) = rest.split_first_chunk::<4>()?;
-        if values.len() != film.pixels.len() * PixelSums::WORDS * 4 {
-            return None;
-        }
+        let (values, loans) = values.split_at_checked(film.pixels.len() * PixelSums::WORDS * 4)?;
+        let (loans, []) = loans.as_chunks::<{ Loan::BYTES }>() else { return None };
         film.rounds = u32::from_le_bytes(*rounds);
         film.photon_weight = f32::from_le_bytes(*photon_weight);
         let mut words = values.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
         for pixel in &mut film.pixels {
             pixel.fill(|| words.next().unwrap_or(0));
+        }
+        for bytes in loans {
+            let mut words = bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
+            let loan = Loan::from_words(std::array::from_fn(|_| words.next().unwrap_or(0)));
+            let known = |pixel: u32| (pixel as usize) < film.pixels.len();
+            if !known(loan.borrower) || !known(loan.lender) {
+                return None;
+            }
+            film.loans.push(loan);
         }
         Some(film)
     }

@@ -214,7 +214,13 @@ impl Render {
             connected.add_to(&mut film);
             eye.eye_rays += connected.rays;
         }
-        self.film.add_round(film, blocks.count as f32);
+        if round == 0 && !self.plan.photons.is_empty() {
+            let mut first = self.film.clone();
+            first.add_round(film, blocks.count as f32);
+            self.film = self.look_again(first, &mut eye, control)?;
+        } else {
+            self.film.add_round(film, blocks.count as f32);
+        }
         self.blocks = blocks.first + blocks.count;
         self.eye.add(&eye);
         for (sum, tally) in self.windows.iter_mut().zip(&sent.tallies) {
@@ -224,6 +230,53 @@ impl Render {
         self.at_milestone();
         self.pass2.add(&start);
         Ok(RoundReport { rounds: self.rounds(), error: self.error_estimate(), seconds: self.seconds() })
+    }
+
+    /// Adds eye samples to the first round where its own find that they are missing: at borders and in half shadows. A
+    /// whole round more, photons and all, would cost more.
+    fn look_again(
+        &self,
+        mut film: Film,
+        eye: &mut EyeCounts,
+        control: &Control,
+    ) -> Result<Film, RenderError> {
+        let errors = Picture::with_smoothing(&film, None).errors();
+        let samples: Vec<u32> = film.pixels().iter().map(|p| p.samples).collect();
+        let measured = self.measured(&film, (&errors, &samples), eye);
+        let effort = Effort::second_look(&measured, hash(self.scene.render.seed, u64::MAX));
+        let context = EyeContext {
+            scene: &self.scene,
+            plan: &self.plan,
+            photons: None,
+            round: film.rounds(),
+            footprints: &self.footprints,
+            film: &film,
+            effort: &effort,
+        };
+        let (more, counts) = pass2_eye::trace_image(&context, control)?;
+        film.add_samples(more);
+        eye.add(&counts);
+        Ok(film)
+    }
+
+    /// What decides on the effort.
+    fn measured<'a>(
+        &self,
+        film: &Film,
+        (errors, samples): (&'a [PixelError], &'a [u32]),
+        eye: &EyeCounts,
+    ) -> Measured<'a> {
+        let sampled: u64 = samples.iter().map(|&n| 2 * u64::from(n)).sum();
+        let photon_rays: u64 = self.windows.iter().map(|t| t.rays).sum();
+        let weight = film.photon_weight();
+        Measured {
+            errors,
+            width: film.size().0,
+            samples,
+            photon_weight: weight,
+            rays_per_block: if weight > 0.0 { photon_rays as f32 / weight } else { 0.0 },
+            rays_per_sample: (eye.eye_rays + eye.shadow_rays) as f32 / sampled.max(1) as f32,
+        }
     }
 
     /// Traces the pixels' footprints once, if photons are counted on them. A progressive radius is the classic
@@ -261,17 +314,7 @@ impl Render {
         let picture = Picture::new(&self.film, &self.footprints);
         let errors = picture.errors();
         let samples: Vec<u32> = self.film.pixels().iter().map(|p| p.samples).collect();
-        let sampled: u64 = samples.iter().map(|&n| 2 * u64::from(n)).sum();
-        let photon_rays: u64 = self.windows.iter().map(|t| t.rays).sum();
-        let weight = self.film.photon_weight();
-        let measured = Measured {
-            errors: &errors,
-            width: self.film.size().0,
-            samples: &samples,
-            photon_weight: weight,
-            rays_per_block: if weight > 0.0 { photon_rays as f32 / weight } else { 0.0 },
-            rays_per_sample: (self.eye.eye_rays + self.eye.shadow_rays) as f32 / sampled.max(1) as f32,
-        };
+        let measured = self.measured(&self.film, (&errors, &samples), &self.eye);
         let key = hash(self.scene.render.seed, u64::from(self.rounds()));
         // A round at most doubles what was done before: no single one overruns a limit of time by far.
         let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);

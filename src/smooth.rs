@@ -63,17 +63,43 @@ pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
         .collect();
     let mut correction = vec![Vec3::ZERO; samples.len()];
     let mut squared_error = vec![None; samples.len()];
+    let mut lent: Vec<Lent> = samples.iter().map(Lent::raw).collect();
     for (segment, ladder) in &filtered {
         for &pixel in &segment.pixels {
             let sample = &samples[pixel as usize];
             let choice = ladder.choice(segment.local(pixel));
             let raw = 0.5 * (sample.irradiance[0] + sample.irradiance[1]);
-            correction[pixel as usize] = sample.gain * (choice.irradiance - raw);
+            let change = choice.irradiance - raw;
+            correction[pixel as usize] = sample.gain * change;
             squared_error[pixel as usize] =
                 Some(choice.squared_error * mean_channel(sample.gain * sample.gain));
+            lent[pixel as usize] = Lent { change, squared_error: choice.squared_error };
         }
     }
+    for loan in film.loans() {
+        let [a, b] = film.gain(loan);
+        let (gain, lent) = (0.5 * (a + b), &lent[loan.lender as usize]);
+        correction[loan.borrower as usize] += gain * lent.change;
+        let error = squared_error[loan.borrower as usize].get_or_insert(0.0);
+        *error += lent.squared_error * mean_channel(gain * gain);
+    }
     Some(Smoothing { correction, squared_error })
+}
+
+/// What a pixel's irradiance is to those that borrow it.
+struct Lent {
+    /// What smoothing adds to it.
+    change: Vec3,
+    /// Estimated squared error that is left, mean over channels.
+    squared_error: f32,
+}
+
+impl Lent {
+    /// Where nothing is smoothed.
+    fn raw(sample: &Sample) -> Self {
+        let half = 0.5 * (sample.irradiance[0] - sample.irradiance[1]);
+        Self { change: Vec3::ZERO, squared_error: mean_channel(half * half) }
+    }
 }
 
 impl Sample {

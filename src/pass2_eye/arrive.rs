@@ -97,10 +97,16 @@ impl EyeWalk<'_> {
 
     /// The photons at the first D: counted on the pixel's footprint, if this is it, else looked up.
     fn see_photons(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, sums: &mut PixelSums) {
-        let footprint = branch.main && self.view == Some(view_code(arrival.hit.sheet, branch.key));
-        if footprint && let Some(albedo) = bsdf.albedo() {
+        let view = view_code(arrival.hit.sheet, branch.key);
+        let footprint = branch.main && self.view == Some(view);
+        if let Some(albedo) = bsdf.albedo() {
             // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
-            sums.gain += branch.throughput * albedo / std::f32::consts::PI;
+            let gain = branch.throughput * albedo / std::f32::consts::PI;
+            if footprint {
+                sums.gain += gain;
+            } else if self.at_border(branch) && self.borrow(view, arrival, gain) {
+                return;
+            }
         }
         match self.lookups {
             Lookups::Nowhere => {}

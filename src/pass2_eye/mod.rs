@@ -4,6 +4,7 @@ mod arrive;
 mod direct;
 mod footprint;
 mod forward;
+mod lender;
 mod outline;
 mod specular;
 mod spread;
@@ -14,7 +15,7 @@ pub use specular::EyeCounts;
 pub use spread::Irradiance;
 
 use crate::effort::Effort;
-use crate::film::{Film, PixelSums, RoundFilm};
+use crate::film::{Film, Loan, PixelSums, RoundFilm};
 use crate::pass1_light::RoundPhotons;
 use crate::plan::Plan;
 use crate::render::{Control, RenderError};
@@ -33,7 +34,7 @@ pub struct EyeContext<'a> {
     pub scene: &'a Scene,
     /// What is computed.
     pub plan: &'a Plan,
-    /// This round's photons, if pass 1 ran.
+    /// This round's photons, if pass 1 ran; `None` also where eye samples alone are added to a round.
     pub photons: Option<&'a RoundPhotons>,
     /// Number of the round.
     pub round: u32,
@@ -74,6 +75,7 @@ pub fn trace_image(
     for tile in tiles {
         counts.add(&tile.counts);
         film.put(tile.x, tile.y, tile.width, &tile.pixels);
+        film.lend(&tile.loans);
     }
     Ok((film, counts))
 }
@@ -83,6 +85,7 @@ struct Tile {
     y: u32,
     width: u32,
     pixels: Vec<PixelSums>,
+    loans: Vec<Loan>,
     counts: EyeCounts,
 }
 
@@ -105,7 +108,7 @@ fn trace_tile(
             pixels.push(sums);
         }
     }
-    Ok(Tile { x, y, width, pixels, counts: walk.counts })
+    Ok(Tile { x, y, width, pixels, loans: walk.loans, counts: walk.counts })
 }
 
 /// One pixel's samples of this round in both halves. Photons are counted on the pixel's footprint; the eye
@@ -117,7 +120,7 @@ fn trace_pixel(
     index: usize,
 ) -> PixelSums {
     let gathers = context.photons.is_some() && context.plan.caustics == Some(Caustics::Photons);
-    let footprint = context.footprints.get(index).filter(|_| gathers);
+    let footprint = context.footprints.get(index);
     let lookups = match footprint {
         _ if !gathers => Lookups::Nowhere,
         None => Lookups::Everywhere,
@@ -128,6 +131,7 @@ fn trace_pixel(
     let first = context.film.pixels()[index].samples;
     let count = context.effort.samples(index).max(gathering);
     let mut sums = PixelSums { samples: count, ..PixelSums::default() };
+    walk.pixel = index as u32;
     for half in 0..2 {
         if let (Some(footprint), Some(photons)) = (footprint, context.photons) {
             sums.halves[half as usize].irradiance = match direct.filter(|_| footprint.direct) {

@@ -9,7 +9,7 @@ use glam::DVec3;
 use std::sync::Arc;
 
 /// First bytes of a checkpoint; the digit is the version of the layout.
-const MAGIC: &[u8; 12] = b"nephroid-cp2";
+const MAGIC: &[u8; 12] = b"nephroid-cp3";
 
 /// Why a checkpoint cannot be continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
