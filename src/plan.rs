@@ -7,7 +7,9 @@ use crate::pass1_light::{self, Block, Budget, Carries, Source, Tally, Window};
 use crate::pass2_eye::{Footprints, Irradiance};
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
-use crate::scene::{Caustics, Environment, Light, LightSampling, Material, ObjectId, Paths, Scene, Warning};
+use crate::scene::{
+    Aiming, Caustics, Environment, Light, LightSampling, Material, ObjectId, Paths, Scene, Warning,
+};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -362,8 +364,9 @@ fn pilot(scene: &Scene, mut window: Window, index: u64) -> Pilot {
         log2 += 4;
         (tally, guide, met) = run(&window, log2);
     }
-    window.guide = guide;
-    let carries = carry::decide(scene, &window, hash(seed, index));
+    let aimed = scene.render.aiming == Aiming::Windows;
+    window.guide = guide.filter(|_| aimed);
+    let carries = if aimed { carry::decide(scene, &window, hash(seed, index)) } else { Carries::Points };
     Pilot { window, tally, sent: 1 << log2, met, carries }
 }
 

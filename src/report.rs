@@ -26,7 +26,7 @@ pub fn plan_json(scene: &Scene, plan: &Plan) -> Value {
         .map(|budget| {
             json!({
                 "light": source_name(scene, budget.window.source),
-                "caster": scene.objects[budget.window.caster.index()].name,
+                "caster": budget.window.caster.map(|caster| &scene.objects[caster.index()].name),
                 "photons_per_round": 2_u64 << budget.log2_block,
                 "carries": budget.carries.as_str(),
             })

@@ -32,8 +32,8 @@ pub(super) enum Step {
 /// Sends photons on their way through a scene.
 pub(super) struct PhotonWalk<'a> {
     scene: &'a Scene,
-    /// The object that a photon must meet first.
-    caster: ObjectId,
+    /// The object that a photon must meet first; any that is specular if `None`.
+    caster: Option<ObjectId>,
     /// What the light is inside of.
     media: Media,
 }
@@ -42,6 +42,14 @@ impl<'a> PhotonWalk<'a> {
     /// For the photons of a window.
     pub(super) fn new(scene: &'a Scene, window: &Window) -> Self {
         Self { scene, caster: window.caster, media: window.media }
+    }
+
+    /// True for an object that a photon may meet first.
+    fn counts(&self, object: ObjectId) -> bool {
+        match self.caster {
+            Some(caster) => object == caster,
+            None => self.scene.material_of(object).has_specular(),
+        }
     }
 
     /// Traces one photon and tells what happens to it. On what is D and S, light rests and goes on.
@@ -67,7 +75,7 @@ impl<'a> PhotonWalk<'a> {
                 return;
             };
             if bounce == 0 {
-                if hit.object != self.caster {
+                if !self.counts(hit.object) {
                     tally.energy.missed += power.as_dvec3();
                     return;
                 }

@@ -6,7 +6,7 @@
 use super::guide::Guide;
 use crate::geometry::{Bounds, Geometry, HullPoint};
 use crate::media::Media;
-use crate::scene::{Light, LightId, ObjectId, Scene, SphereLight};
+use crate::scene::{Aiming, Light, LightId, ObjectId, Scene, SphereLight};
 use glam::{Vec2, Vec3};
 
 /// What sends light.
@@ -25,8 +25,8 @@ pub struct Window {
     pub source: Source,
     /// What the source is inside of.
     pub media: Media,
-    /// The object the photons must meet first.
-    pub caster: ObjectId,
+    /// The object the photons must meet first; any that is specular if `None`.
+    pub caster: Option<ObjectId>,
     /// The bound.
     pub region: Region,
     /// Where in it the photons come from that arrive, if a pilot has found that out.
@@ -79,22 +79,45 @@ pub fn windows(scene: &Scene) -> Vec<Window> {
     if !scene.environment.is_black() {
         sources.push(Source::Environment);
     }
+    if scene.render.aiming == Aiming::Everywhere && !casters.is_empty() {
+        return sources.into_iter().map(|source| everywhere(scene, source)).collect();
+    }
     let hulls: Vec<Vec<HullPoint>> = casters.iter().map(|&o| scene.geometry.hull(o)).collect();
     let mut windows = Vec::new();
     for &source in &sources {
-        let media = match source {
-            Source::Light(id) => Media::around_light(scene, &scene.lights[id.index()]),
-            Source::Environment => Media::default(),
-        };
+        let media = media_around(scene, source);
         for (&caster, hull) in casters.iter().zip(&hulls) {
             let region = match source {
                 Source::Light(id) => region(&scene.lights[id.index()], &scene.geometry, caster, hull),
-                Source::Environment => enclosing_disc(&scene.geometry, caster),
+                Source::Environment => enclosing_disc(&scene.geometry.object_bounds(caster)),
             };
-            windows.push(Window { source, media, caster, region, guide: None });
+            windows.push(Window { source, media, caster: Some(caster), region, guide: None });
         }
     }
     windows
+}
+
+fn media_around(scene: &Scene, source: Source) -> Media {
+    match source {
+        Source::Light(id) => Media::around_light(scene, &scene.lights[id.index()]),
+        Source::Environment => Media::default(),
+    }
+}
+
+/// All that a source sends; what comes from infinitely far away is bounded by the scene.
+fn everywhere(scene: &Scene, source: Source) -> Window {
+    let bounds = scene.geometry.bounds();
+    let region = match source {
+        Source::Environment => enclosing_disc(&bounds),
+        Source::Light(id) => match &scene.lights[id.index()] {
+            Light::Directional { direction, .. } => {
+                let hull = bounds.corners().map(|position| HullPoint { position, radius: 0.0 });
+                parallel_window(bounds.center(), *direction, &hull)
+            }
+            _ => Region::AllDirections,
+        },
+    };
+    Window { source, media: media_around(scene, source), caster: None, region, guide: None }
 }
 
 fn region(light: &Light, geometry: &Geometry, caster: ObjectId, hull: &[HullPoint]) -> Region {
@@ -134,8 +157,7 @@ fn cube_around(sphere: &SphereLight, target: Vec3) -> [Vec3; 8] {
     })
 }
 
-fn enclosing_disc(geometry: &Geometry, caster: ObjectId) -> Region {
-    let bounds = geometry.object_bounds(caster);
+fn enclosing_disc(bounds: &Bounds) -> Region {
     Region::Disc { center: bounds.center(), radius: bounds.radius() * (1.0 + MARGIN) }
 }
 

@@ -14,7 +14,7 @@ use super::read::{
 };
 use super::schema::Definitions;
 use super::shape_file::{MotionFile, ShapeFile};
-use super::{Caustics, LightSampling, Paths, Tone};
+use super::{Aiming, Caustics, LightSampling, Paths, Tone};
 use crate::geometry::Structure;
 use crate::radius::RadiusRule;
 use serde_json::json;
@@ -165,6 +165,8 @@ record! {
         /// Reach of the caustics' density estimate: a `pixel`, smoothed after; and for comparison a radius that shrinks from
         /// round to round (`progressive`), one that is `fixed`, or that of the `nearest` photons.
         radius: RadiusRule = or(Radius, RadiusRule::Pixel),
+        /// Where photons are sent: through `windows` toward what is specular, or for comparison `everywhere`.
+        aiming: Aiming = or(choice(Aiming::NAMED.to_vec()), Aiming::Windows),
         /// The structure that finds what a ray meets; all find the same.
         structure: Structure = or(choice(Structure::NAMED.to_vec()), Structure::Auto),
         /// How quad and disk lights are sampled: by one point per eye sample (`sobol`), or by the squares of a grid,
@@ -185,6 +187,7 @@ impl Default for RenderFile {
             caustics: Caustics::default(),
             stop: None,
             radius: RadiusRule::default(),
+            aiming: Aiming::default(),
             structure: Structure::default(),
             light_sampling: LightSampling::default(),
             light_grid: LIGHT_GRID,

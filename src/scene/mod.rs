@@ -215,6 +215,22 @@ impl std::str::FromStr for Caustics {
     }
 }
 
+/// Where photons are sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Aiming {
+    /// From each light toward each specular object, and there where a pilot run has found them to arrive.
+    #[default]
+    Windows,
+    /// In all directions that a light sends to; those that do not meet a mirror or glass first are lost: the photon map
+    /// of 1996, for comparison.
+    Everywhere,
+}
+
+impl Aiming {
+    /// Every value and its name.
+    pub const NAMED: [(&str, Self); 2] = [("windows", Self::Windows), ("everywhere", Self::Everywhere)];
+}
+
 /// How a quad or disk light is sampled at a D.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LightSampling {
@@ -251,6 +267,8 @@ pub struct RenderSettings {
     pub stop: Stop,
     /// Radius of the caustics' density estimate.
     pub radius: RadiusRule,
+    /// Where photons are sent.
+    pub aiming: Aiming,
     /// The structure over the primitives.
     pub structure: Structure,
     /// How quad and disk lights are sampled.

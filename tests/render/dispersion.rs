@@ -112,7 +112,8 @@ fn f74_a_prism_throws_a_continuous_spectrum() {
     let scene = compile(&value);
     let block = Block { first: 0, count: 1 << 14, seed: 3 };
     let all = windows(&scene);
-    let window = all.iter().find(|w| scene.objects[w.caster.index()].name == "objects/0").expect("a window");
+    let window =
+        all.iter().find(|w| scene.objects[w.caster.unwrap().index()].name == "objects/0").expect("a window");
     let (photons, tally) = trace_block(&scene, window, block, &Control::new()).unwrap();
     let mut heights: Vec<f32> =
         photons.iter().filter(|p| (p.position.x - 20.0).abs() < 1e-2).map(|p| p.position.y).collect();

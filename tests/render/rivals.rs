@@ -158,6 +158,26 @@ fn path_tracing_and_photons_agree_on_indirect_light() {
     assert!((a.mean - b.mean).abs() <= T_LIMIT * error + 2e-3 * a.mean, "{a:?} {b:?}");
 }
 
+/// Photons sent everywhere bring the same light as those aimed at the ball, from a light with a size, from afar and from
+/// the sky; most are lost.
+#[test]
+fn photons_sent_everywhere_bring_the_same_light() {
+    let mut value = beside_a_ball();
+    let sun = json!({ "type": "directional", "direction": [-0.4, -1, -0.2], "irradiance": [3, 3, 3] });
+    let lights = [value["lights"].clone(), json!([sun]), json!([])];
+    for (lights, sky) in lights.into_iter().zip([0.0, 0.0, 0.5]) {
+        value["lights"] = lights;
+        value["environment"] = json!({ "radiance": [sky, sky, sky] });
+        let [aimed, all] = [("windows", 14), ("everywhere", 18)].map(|(aiming, log2_photons)| {
+            value["render"]["aiming"] = json!(aiming);
+            estimate("photons", &value, PathClass::Caustic, Cost { rounds: 1, log2_photons })
+        });
+        let error = aimed.standard_error.hypot(all.standard_error);
+        assert!(T_LIMIT * error < 0.1 * aimed.mean, "too noisy to tell: {aimed:?} {all:?}");
+        assert!((aimed.mean - all.mean).abs() <= T_LIMIT * error, "{aimed:?} {all:?}");
+    }
+}
+
 fn plan(estimator: &str, lights: Value) -> Plan {
     let mut value = beside_a_ball();
     value["lights"] = lights;

@@ -233,9 +233,28 @@ impl<'f> Compiler<'f> {
                 Stop { error: error.map(|e| e as f32), seconds: *seconds, rounds: *rounds }
             }
         };
-        let RenderFile { paths, caustics, radius, structure, light_sampling, light_grid, seed, stop: _ } =
-            *render;
-        Some(RenderSettings { paths, caustics, stop, radius, structure, light_sampling, light_grid, seed })
+        let RenderFile {
+            paths,
+            caustics,
+            radius,
+            aiming,
+            structure,
+            light_sampling,
+            light_grid,
+            seed,
+            stop: _,
+        } = *render;
+        Some(RenderSettings {
+            paths,
+            caustics,
+            stop,
+            radius,
+            aiming,
+            structure,
+            light_sampling,
+            light_grid,
+            seed,
+        })
     }
 }
 
