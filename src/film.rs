@@ -1,5 +1,9 @@
 //! The film: one layer per class of paths and half, summed over rounds.
 
+mod layers;
+
+pub use layers::LayerSums;
+
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::scene::Caustics;
@@ -147,11 +151,17 @@ impl PixelSums {
 pub struct RoundFilm {
     width: u32,
     pixels: Vec<PixelSums>,
+    /// As in [`Film`].
+    layers: Vec<LayerSums>,
 }
 
 impl RoundFilm {
-    pub(crate) fn new(width: u32, height: u32) -> Self {
-        Self { width, pixels: vec![PixelSums::default(); width as usize * height as usize] }
+    /// With this many named layers.
+    pub(crate) fn new(width: u32, height: u32, layers: usize) -> Self {
+        let count = width as usize * height as usize;
+        let (pixels, layers) =
+            (vec![PixelSums::default(); count], vec![LayerSums::default(); count * layers]);
+        Self { width, pixels, layers }
     }
 
     /// Puts a tile's pixels, row by row, at (x, y).
@@ -182,14 +192,18 @@ pub struct Film {
     /// Sum of the rounds' photon weights.
     photon_weight: f32,
     pixels: Vec<PixelSums>,
+    /// The named layers of each pixel, one pixel after the other.
+    layers: Vec<LayerSums>,
 }
 
 impl Film {
-    /// An empty film, for caustics by this estimator.
+    /// An empty film, for caustics by this estimator, with this many named layers.
     #[must_use]
-    pub fn new(width: u32, height: u32, caustics: Caustics) -> Self {
-        let pixels = vec![PixelSums::default(); width as usize * height as usize];
-        Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels }
+    pub fn new(width: u32, height: u32, caustics: Caustics, layers: usize) -> Self {
+        let count = width as usize * height as usize;
+        let (pixels, layers) =
+            (vec![PixelSums::default(); count], vec![LayerSums::default(); count * layers]);
+        Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels, layers }
     }
 
     /// Bytes a film of this size holds.
@@ -205,6 +219,9 @@ impl Film {
         for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
             pixel.weigh_photons(photon_weight, self.caustics);
             sum.add(pixel);
+        }
+        for (sum, layer) in self.layers.iter_mut().zip(&round.layers) {
+            sum.add(layer, photon_weight);
         }
     }
 
@@ -269,23 +286,31 @@ impl Film {
         for pixel in &self.pixels {
             pixel.visit(|word| bytes.extend(word.to_le_bytes()));
         }
+        for layer in &self.layers {
+            layer.to_array().into_iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        }
         bytes
     }
 
     /// The film of [`Film::to_bytes`] for an empty one of the same kind; `None` if the length does not fit the size.
     #[must_use]
     pub fn read(&self, bytes: &[u8]) -> Option<Self> {
-        let mut film = Self::new(self.width, self.height, self.caustics);
+        let mut film = Self { rounds: 0, photon_weight: 0.0, ..self.clone() };
         let (rounds, rest) = bytes.split_first_chunk::<4>()?;
         let (photon_weight, values) = rest.split_first_chunk::<4>()?;
-        if values.len() != film.pixels.len() * PixelSums::WORDS * 4 {
+        let (pixels, layers) = values.split_at_checked(film.pixels.len() * PixelSums::WORDS * 4)?;
+        if layers.len() != film.layers.len() * LayerSums::BYTES as usize {
             return None;
         }
         film.rounds = u32::from_le_bytes(*rounds);
         film.photon_weight = f32::from_le_bytes(*photon_weight);
-        let mut words = values.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
+        let mut words = pixels.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
         for pixel in &mut film.pixels {
             pixel.fill(|| words.next().unwrap_or(0));
+        }
+        let mut numbers = layers.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
+        for layer in &mut film.layers {
+            *layer = LayerSums::from_array(std::array::from_fn(|_| numbers.next().unwrap_or(0.0)));
         }
         Some(film)
     }

@@ -166,7 +166,8 @@ impl Render {
     pub fn new(scene: Arc<Scene>, plan: Plan) -> Self {
         let preview =
             LinearImage { width: scene.image.width, height: scene.image.height, pixels: Vec::new() };
-        let film = Film::new(scene.image.width, scene.image.height, scene.render.caustics);
+        let film =
+            Film::new(scene.image.width, scene.image.height, scene.render.caustics, plan.layer_names.len());
         let windows = vec![Tally::default(); plan.photons.len()];
         let time = PassTime::default();
         Self {
@@ -230,7 +231,8 @@ impl Render {
     /// method instead: photons are looked up point by point, and nothing is smoothed.
     fn trace_footprints(&mut self) {
         let gathered = !self.plan.photons.is_empty() && self.plan.caustics == Some(Caustics::Photons);
-        let counted = gathered && self.plan.radius == RadiusRule::Pixel;
+        let seen = self.plan.classes.contains(PathClass::Caustic);
+        let counted = gathered && seen && self.plan.radius == RadiusRule::Pixel;
         if counted && self.footprints.size().0 == 0 {
             self.footprints = Footprints::trace(&self.scene, &self.plan.eye_media);
         }
@@ -351,7 +353,7 @@ impl Render {
     pub fn picture(&self) -> Picture<'_> {
         match &self.smoothing {
             Some((rounds, smoothing)) if *rounds == self.rounds() => {
-                Picture::with_smoothing(&self.film, smoothing.as_ref())
+                Picture::with_smoothing(&self.film, &self.footprints, smoothing.as_ref())
             }
             _ => Picture::new(&self.film, &self.footprints),
         }
