@@ -49,8 +49,9 @@ pub struct Spread {
 /// The light is quartered at most this often; then chance decides.
 const MOST_DEPTH: u32 = 2;
 
-/// How far the probe may land from where it would between the corners' landing points, in pixels.
-const STRAIGHTNESS: f32 = 0.2;
+/// How far the probe may land from where it would between the corners' landing points, in pixels. So far off may the light
+/// of a focus be that is smaller than a pixel.
+const STRAIGHTNESS: f32 = 0.1;
 
 /// A part of a light is probed at one of these points, by chance. In the middle what is odd would not show (three images
 /// of one point near a cusp), on the diagonals not a saddle, which is 0 there as at the corners.
@@ -161,7 +162,8 @@ impl ImageTracer<'_> {
         }
         let expected = |[a, b, c, d]: [Vec3; 4]| a.lerp(b, x).lerp(d.lerp(c, x), y);
         let bend = probe.position - expected(corners);
-        let pixel = self.camera.pixel_width((probe.position - self.camera.eye).length());
+        let depth = (probe.position - self.camera.eye).dot(self.camera.forward);
+        let pixel = self.camera.pixel_width(depth.max(0.0));
         if bend.length() > STRAIGHTNESS * pixel && !self.out_of_view(&corners) {
             return None;
         }
