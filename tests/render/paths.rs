@@ -150,11 +150,12 @@ fn an_expression_that_is_a_preset_is_rendered_as_one() {
     assert!(preset == expression);
 }
 
-/// A glass ball and a mirror over a floor in a quad's and a point's light.
+/// A glass ball, a mirror and a wall over a floor in a quad's and a point's light.
 fn beside_a_ball() -> Value {
     let objects = json!([
         floor(3.0, 0.0),
         { "type": "sphere", "material": "glass", "center": [0, 0.55, 0], "radius": 0.5 },
+        { "type": "polygon", "material": "floor", "vertices": [[-2, 0, 1.2], [1, 0, 1.2], [1, 1, 1.2], [-2, 1, 1.2]] },
         { "type": "polygon", "material": "mirror", "vertices": [[-1.5, 0, 1], [-1.5, 0, -1], [-1.5, 1, -1], [-1.5, 1, 1]] }]);
     let lights = json!([
         { "type": "quad", "center": [1.2, 3.0, 0.6], "size": [0.8, 0.8], "towards": [0, 0.55, 0], "radiance": [9, 9, 9], "group": "window" },
@@ -297,7 +298,7 @@ fn assert_agree(what: &str, a: Estimate, b: Estimate) {
 fn a_layer_is_the_picture_of_its_paths() {
     let mut value = beside_a_ball();
     value["lights"].as_array_mut().unwrap().remove(0);
-    for paths in ["LSDE", "LS{2}DE", "LS{2,}D.*E", "LS+DSE|LDSE", "LDSDE|LSSDSDE"] {
+    for paths in ["LSDE", "LS{2}DE", "LS{2,}D.*E", "LS+DSE|LDSE", "LDDE|LSSDDE"] {
         value["render"] =
             json!({ "paths": "complete", "layers": { "part": paths }, "stop": { "rounds": 1 } });
         let layer = light(&value, Some("part"));
