@@ -1,7 +1,10 @@
 //! The film: one layer per class of paths and half, summed over rounds.
 
+mod bytes;
+mod layers;
 mod loans;
 
+pub use layers::LayerSums;
 pub use loans::Loan;
 
 use crate::image_io::LinearImage;
@@ -156,12 +159,17 @@ pub struct RoundFilm {
     width: u32,
     pixels: Vec<PixelSums>,
     loans: Vec<Loan>,
+    /// As in [`Film`].
+    layers: Vec<LayerSums>,
 }
 
 impl RoundFilm {
-    pub(crate) fn new(width: u32, height: u32) -> Self {
-        let pixels = vec![PixelSums::default(); width as usize * height as usize];
-        Self { width, pixels, loans: Vec::new() }
+    /// With this many named layers.
+    pub(crate) fn new(width: u32, height: u32, layers: usize) -> Self {
+        let count = width as usize * height as usize;
+        let (pixels, layers) =
+            (vec![PixelSums::default(); count], vec![LayerSums::default(); count * layers]);
+        Self { width, pixels, loans: Vec::new(), layers }
     }
 
     /// Adds what a tile's pixels borrow.
@@ -199,14 +207,19 @@ pub struct Film {
     pixels: Vec<PixelSums>,
     /// What pixels at borders borrow, in the order of borrowers and lenders.
     loans: Vec<Loan>,
+    /// The named layers of each pixel, one pixel after the other.
+    layers: Vec<LayerSums>,
 }
 
 impl Film {
-    /// An empty film, for caustics by this estimator.
+    /// An empty film, for caustics by this estimator, with this many named layers.
     #[must_use]
-    pub fn new(width: u32, height: u32, caustics: Caustics) -> Self {
-        let pixels = vec![PixelSums::default(); width as usize * height as usize];
-        Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels, loans: Vec::new() }
+    pub fn new(width: u32, height: u32, caustics: Caustics, layers: usize) -> Self {
+        let count = width as usize * height as usize;
+        let (pixels, layers) =
+            (vec![PixelSums::default(); count], vec![LayerSums::default(); count * layers]);
+        let loans = Vec::new();
+        Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels, loans, layers }
     }
 
     /// Bytes a film of this size holds.
@@ -232,6 +245,9 @@ impl Film {
         for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
             pixel.weigh_photons(photon_weight, self.caustics);
             sum.add(pixel);
+        }
+        for (sum, layer) in self.layers.iter_mut().zip(&round.layers) {
+            sum.add(layer, photon_weight);
         }
     }
 
@@ -316,74 +332,6 @@ impl Film {
     #[must_use]
     pub fn pixels(&self) -> &[PixelSums] {
         &self.pixels
-    }
-
-    /// Raw values for a checkpoint: rounds, then every number.
-    #[must_use]
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(8 + self.pixels.len() * PixelSums::WORDS * 4);
-        bytes.extend(self.rounds.to_le_bytes());
-        bytes.extend(self.photon_weight.to_le_bytes());
-        for pixel in &self.pixels {
-            pixel.visit(|word| bytes.extend(word.to_le_bytes()));
-        }
-        for loan in &self.loans {
-            loan.to_words().into_iter().for_each(|word| bytes.extend(word.to_le_bytes()));
-        }
-        bytes
-    }
-
-    /// The film of [`Film::to_bytes`] for an empty one of the same kind; `None` if the length does not fit the size.
-    #[must_use]
-    pub fn read(&self, bytes: &[u8]) -> Option<Self> {
-        let mut film = Self::new(self.width, self.height, self.caustics);
-        let (rounds, rest) = bytes.split_first_chunk::<4>()?;
-        let (photon_weight, values) = rest.split_first_chunk::<4>()?;
-        let (values, loans) = values.split_at_checked(film.pixels.len() * PixelSums::WORDS * 4)?;
-        let (loans, []) = loans.as_chunks::<{ Loan::BYTES }>() else { return None };
-        film.rounds = u32::from_le_bytes(*rounds);
-        film.photon_weight = f32::from_le_bytes(*photon_weight);
-        let mut words = values.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
-        for pixel in &mut film.pixels {
-            pixel.fill(|| words.next().unwrap_or(0));
-        }
-        for bytes in loans {
-            let mut words = bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
-            let loan = Loan::from_words(std::array::from_fn(|_| words.next().unwrap_or(0)));
-            let known = |pixel: u32| (pixel as usize) < film.pixels.len();
-            if !known(loan.borrower) || !known(loan.lender) {
-                return None;
-            }
-            film.loans.push(loan);
-        }
-        Some(film)
-    }
-}
-
-impl PixelSums {
-    /// Number of 32-bit words in a pixel.
-    const WORDS: usize = size_of::<Self>() / 4;
-
-    /// The numbers of a pixel as 32-bit words, in a fixed order.
-    fn visit(&self, mut word: impl FnMut(u32)) {
-        let mut vector = |v: Vec3| v.to_array().into_iter().for_each(|x| word(x.to_bits()));
-        for half in &self.halves {
-            half.classes.0.iter().for_each(|v| vector(*v));
-            vector(half.irradiance);
-        }
-        vector(self.gain);
-        word(self.samples);
-    }
-
-    /// The inverse of [`PixelSums::visit`].
-    fn fill(&mut self, mut word: impl FnMut() -> u32) {
-        let mut vector = || Vec3::from_array(std::array::from_fn(|_| f32::from_bits(word())));
-        for half in &mut self.halves {
-            half.classes.0.iter_mut().for_each(|v| *v = vector());
-            half.irradiance = vector();
-        }
-        self.gain = vector();
-        self.samples = word();
     }
 }
 

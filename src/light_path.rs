@@ -1,5 +1,14 @@
 //! The alphabet of light paths, `L(D|S)*E`, and the classes an image is split into.
 
+mod automaton;
+mod expression;
+mod language;
+mod paths;
+
+pub use expression::ExpressionError;
+pub use language::{Kind, Kinds, Language, Layers, MOST_LAYERS, PICTURE, Pictures, Trail};
+pub use paths::{Expression, Paths, PathsError, Share};
+
 /// What a path met at a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bounce {
@@ -7,6 +16,30 @@ pub enum Bounce {
     Diffuse,
     /// S: a mirror or smooth glass.
     Specular,
+}
+
+impl Bounce {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Diffuse, Self::Specular];
+}
+
+/// A set of classes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Classes(u8);
+
+impl Classes {
+    /// Whether a class is one of them.
+    #[inline]
+    #[must_use]
+    pub fn contains(self, class: PathClass) -> bool {
+        self.0 >> class as u8 & 1 == 1
+    }
+}
+
+impl FromIterator<PathClass> for Classes {
+    fn from_iter<T: IntoIterator<Item = PathClass>>(classes: T) -> Self {
+        Self(classes.into_iter().fold(0, |set, class| set | 1 << class as u8))
+    }
 }
 
 /// The disjoint classes of light paths; each has exactly one estimator.

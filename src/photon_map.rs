@@ -1,6 +1,7 @@
 //! Photons and the kd-tree that finds them again; the only file that names `kiddo`.
 
 use crate::geometry::SheetId;
+use crate::light_path::Kind;
 use crate::pass2_eye::Footprint;
 use glam::{Mat3, Vec3};
 use kiddo::leaf_strategy::FlatVec;
@@ -21,6 +22,8 @@ pub struct Photon {
     pub normal: Vec3,
     /// The sheet of surface it lies on.
     pub sheet: SheetId,
+    /// Which light it is, and what it has met, where layers or expressions tell photons apart; else 0.
+    pub kind: Kind,
     /// Power per channel, W.
     pub power: Vec3,
 }
@@ -29,7 +32,8 @@ pub struct Photon {
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 struct Stored {
     power: [f32; 3],
-    sheet: u32,
+    /// Sheet and kind.
+    place: u32,
     direction: u32,
     normal: u32,
 }
@@ -47,6 +51,18 @@ pub const BYTES_PER_PHOTON: u64 = 36;
 pub struct PhotonMap {
     tree: Option<Tree>,
     count: usize,
+}
+
+/// Bits of a photon's place that name the sheet: more sheets than a scene has, whose primitives are far larger.
+const SHEETS: u32 = 0xff_ffff;
+
+/// Light that a look-up finds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Incoming {
+    /// Unit direction to where it came from.
+    pub direction: Vec3,
+    /// Which light it is, and what it has met.
+    pub kind: Kind,
 }
 
 /// Where and how wide to look.
@@ -112,12 +128,12 @@ impl PhotonMap {
     /// the density is uniform; `per_irradiance` of the direction to where a photon came from weighs it. Only photons
     /// on the same sheet, with a similar normal, arriving on the side that is seen, and near the tangent plane count.
     #[must_use]
-    pub fn radiance(&self, lookup: &Lookup, per_irradiance: impl Fn(Vec3) -> Vec3) -> Vec3 {
+    pub fn radiance(&self, lookup: &Lookup, per_irradiance: impl Fn(Incoming) -> Vec3) -> Vec3 {
         let radius2 = lookup.radius * lookup.radius;
         let mut sum = Vec3::ZERO;
         self.visit(lookup, lookup.radius, |distance2, photon| {
             let power = Vec3::from_array(photon.power) * (1.0 - distance2 / radius2);
-            sum += power * per_irradiance(-decode_direction(photon.direction));
+            sum += power * per_irradiance(photon.incoming());
         });
         if sum == Vec3::ZERO { sum } else { sum * (2.0 / (std::f32::consts::PI * radius2)) }
     }
@@ -138,7 +154,7 @@ impl PhotonMap {
             .with_points()
             .visit(|hit| {
                 let photon = hit.item;
-                let same_sheet = photon.sheet == lookup.sheet.0;
+                let same_sheet = photon.sheet() == lookup.sheet.0;
                 let height = (Vec3::from_array(hit.point) - center).dot(normal);
                 // The photon's plane may tilt by 45° over the kernel's radius at most.
                 let near_plane = height * height <= 0.5 * hit.distance + radius2 * 1e-4;
@@ -156,6 +172,12 @@ impl PhotonMap {
     /// Power of the photons that lie on a pixel's footprint, W.
     #[must_use]
     pub fn flux_within(&self, footprint: &Footprint) -> Vec3 {
+        self.flux_of(footprint, |_| true)
+    }
+
+    /// The same, of the kinds that are picked.
+    #[must_use]
+    pub fn flux_of(&self, footprint: &Footprint, pick: impl Fn(Kind) -> bool) -> Vec3 {
         let Some(tree) = &self.tree else { return Vec3::ZERO };
         let center = footprint.center();
         let corners = footprint.corners.map(|corner| corner - center);
@@ -179,7 +201,11 @@ impl PhotonMap {
                 let photon = hit.item;
                 let at = Vec3::from_array(hit.point) - middle;
                 let inside = edges.iter().all(|(inward, offset)| at.dot(*inward) >= *offset);
-                if inside && photon.sheet == footprint.sheet.0 && photon.arrives_on(footprint.normal) {
+                if inside
+                    && pick(photon.kind())
+                    && photon.sheet() == footprint.sheet.0
+                    && photon.arrives_on(footprint.normal)
+                {
                     sum += Vec3::from_array(photon.power);
                 }
             });
@@ -194,7 +220,7 @@ impl From<&Photon> for Stored {
     fn from(photon: &Photon) -> Self {
         Self {
             power: photon.power.to_array(),
-            sheet: photon.sheet.0,
+            place: photon.sheet.0 & SHEETS | u32::from(photon.kind) << SHEETS.trailing_ones(),
             direction: encode_direction(photon.direction),
             normal: encode_direction(photon.normal),
         }
@@ -202,6 +228,22 @@ impl From<&Photon> for Stored {
 }
 
 impl Stored {
+    #[inline]
+    fn sheet(&self) -> u32 {
+        self.place & SHEETS
+    }
+
+    #[inline]
+    fn kind(&self) -> Kind {
+        (self.place >> SHEETS.trailing_ones()) as Kind
+    }
+
+    /// Where it came from.
+    #[inline]
+    fn incoming(&self) -> Incoming {
+        Incoming { direction: -decode_direction(self.direction), kind: self.kind() }
+    }
+
     /// True if the photon's surface faces the same way, or the opposite.
     #[inline]
     fn is_aligned(&self, normal: Vec3) -> bool {

@@ -4,28 +4,34 @@ use crate::film::{Film, PixelMeans};
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::pass2_eye::Footprints;
+use crate::plan::Layer;
 use crate::scene::Caustics;
-use crate::smooth::{Smoothing, smooth};
+use crate::smooth::{Smoothing, smooth, smooth_part};
 use glam::Vec3;
 use std::borrow::Cow;
 
 /// A film with the smoothing of its caustics.
 pub struct Picture<'a> {
     film: &'a Film,
+    footprints: &'a Footprints,
     smoothing: Option<Cow<'a, Smoothing>>,
 }
 
 impl<'a> Picture<'a> {
     /// Smooths the film's caustics.
     #[must_use]
-    pub fn new(film: &'a Film, footprints: &Footprints) -> Self {
-        Self { film, smoothing: smooth(film, footprints).map(Cow::Owned) }
+    pub fn new(film: &'a Film, footprints: &'a Footprints) -> Self {
+        Self { film, footprints, smoothing: smooth(film, footprints).map(Cow::Owned) }
     }
 
     /// A picture whose smoothing is known.
     #[must_use]
-    pub fn with_smoothing(film: &'a Film, smoothing: Option<&'a Smoothing>) -> Self {
-        Self { film, smoothing: smoothing.map(Cow::Borrowed) }
+    pub fn with_smoothing(
+        film: &'a Film,
+        footprints: &'a Footprints,
+        smoothing: Option<&'a Smoothing>,
+    ) -> Self {
+        Self { film, footprints, smoothing: smoothing.map(Cow::Borrowed) }
     }
 
     /// The smoothing, to keep.
@@ -50,13 +56,28 @@ impl<'a> Picture<'a> {
         }
     }
 
-    fn corrected(&self, mut image: LinearImage) -> LinearImage {
-        if let Some(smoothing) = &self.smoothing {
-            for (pixel, correction) in image.pixels.iter_mut().zip(&smoothing.correction) {
-                *pixel = (Vec3::from_array(*pixel) + *correction).to_array();
-            }
+    /// A layer: a class, or a named one.
+    #[must_use]
+    pub fn part(&self, layer: &Layer) -> LinearImage {
+        match layer {
+            Layer::Class(class) => self.layer(*class),
+            Layer::Named { index, .. } => self.named_layer(*index),
         }
-        image
+    }
+
+    /// A named layer, its part of the caustics smoothed as the whole is.
+    fn named_layer(&self, index: usize) -> LinearImage {
+        let layer = self.film.named_layer(index);
+        let Some(smoothing) = &self.smoothing else { return layer };
+        let irradiance = self.film.layer_irradiance(index);
+        add(layer, &smooth_part(self.film, self.footprints, smoothing, &irradiance))
+    }
+
+    fn corrected(&self, image: LinearImage) -> LinearImage {
+        match &self.smoothing {
+            Some(smoothing) => add(image, &smoothing.correction),
+            None => image,
+        }
     }
 
     /// Estimated relative error of the image: the root of the mean over pixels and channels of
@@ -123,6 +144,13 @@ impl PixelError {
         let sum: f64 = errors.iter().map(|e| f64::from(e.sampled + e.photons)).sum();
         (sum / errors.len().max(1) as f64).sqrt() as f32
     }
+}
+
+fn add(mut image: LinearImage, correction: &[Vec3]) -> LinearImage {
+    for (pixel, correction) in image.pixels.iter_mut().zip(correction) {
+        *pixel = (Vec3::from_array(*pixel) + *correction).to_array();
+    }
+    image
 }
 
 fn mean_channel(v: Vec3) -> f32 {

@@ -1,19 +1,23 @@
 //! The plan: what this scene needs, what is left out, and why.
 
 use crate::effort::MOST_SHIFT;
-use crate::film::Film;
+use crate::film::{Film, LayerSums};
+use crate::light_path::{Bounce, Classes, Language};
 use crate::media::Media;
 use crate::pass1_light::{self, Block, Budget, Carries, Source, Tally, Window};
 use crate::pass2_eye::{Footprints, Irradiance};
 use crate::radius::RadiusRule;
 use crate::sampling::hash;
-use crate::scene::{
-    Aiming, Caustics, Environment, Light, LightSampling, Material, ObjectId, Paths, Scene, Warning,
-};
+use crate::scene::{Aiming, Caustics, Environment, Light, LightSampling, ObjectId, Paths, Scene, Warning};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
+pub use asked::Layer;
+
+mod asked;
 mod carry;
+mod details;
+pub(crate) mod language;
 mod reach;
 mod rivals;
 
@@ -22,6 +26,12 @@ mod rivals;
 pub struct Plan {
     /// Photon windows and their budgets; empty if pass 1 does not run.
     pub photons: Vec<Budget>,
+    /// The classes of paths that are asked for and can occur.
+    pub classes: Classes,
+    /// What tells the paths that are asked for, and those of named layers, where the class alone does not.
+    pub language: Option<Language>,
+    /// The layers besides those of the classes.
+    pub layer_names: Vec<String>,
     /// The estimator that computes the caustics, if there can be any.
     pub caustics: Option<Caustics>,
     /// Radius of the density estimate.
@@ -87,6 +97,9 @@ impl Plan {
     pub fn new(scene: &Scene) -> Self {
         let mut plan = Self {
             photons: Vec::new(),
+            classes: asked::classes(scene),
+            language: None,
+            layer_names: Vec::new(),
             caustics: None,
             radius: scene.render.radius,
             eye_media: Media::around(scene, scene.camera.eye),
@@ -97,18 +110,12 @@ impl Plan {
             warnings: scene.warnings.clone(),
             memory_bytes: 0,
         };
+        plan.decide_layers(scene);
         plan.decide_pass_1(scene);
+        plan.decide_emitted(scene);
         plan.decide_direct(scene);
         plan.decide_structure(scene);
-        match scene.camera.lens() {
-            Some(_) => plan.decide(
-                "lens",
-                true,
-                "one point of the lens per eye sample",
-                "the camera has an aperture",
-            ),
-            None => plan.decide("lens", false, "pinhole", "the camera has no aperture: no lens samples"),
-        }
+        plan.decide_lens(scene);
         plan.decide_time();
         plan.decide_colour(scene);
         plan.decide_indirect(scene);
@@ -131,9 +138,13 @@ impl Plan {
     }
 
     fn decide_pass_1(&mut self, scene: &Scene) {
-        if scene.render.paths == Paths::Whitted {
-            self.decide("pass 1", false, "no photons", "the paths asked for, LS*E|LDS*E, hold no caustic");
-            if scene.objects.iter().any(|o| scene.materials[o.material.index()].has_specular()) {
+        let paths = &scene.render.paths;
+        if !asked::any(scene, asked::THROUGH_SPECULAR, &Bounce::ALL) {
+            let reason = format!("the paths asked for, {paths}, hold no caustic");
+            self.decide("pass 1", false, "no photons", reason);
+            if *paths == Paths::Whitted
+                && scene.objects.iter().any(|o| scene.materials[o.material.index()].has_specular())
+            {
                 let message =
                     "mirrors and glass cast plain shadows: the paths asked for leave out what they throw";
                 self.warn("caustics_left_out", message);
@@ -162,7 +173,8 @@ impl Plan {
             self.decide_backward(scene);
             return;
         }
-        let windows = pass1_light::windows(scene);
+        let mut windows = pass1_light::windows(scene);
+        windows.iter_mut().for_each(|window| window.kinds = self.photon_kinds(window.source));
         if windows.is_empty() {
             self.decide("pass 1", false, "no photons", "no light gives light");
             return;
@@ -237,6 +249,11 @@ impl Plan {
     }
 
     fn decide_direct(&mut self, scene: &Scene) {
+        if !asked::any(scene, asked::STRAIGHT, &Bounce::ALL) {
+            let reason = format!("the paths asked for, {}, have an S after each L", scene.render.paths);
+            self.decide("direct light", false, "nothing", reason);
+            return;
+        }
         let delta = |l: &Light| l.surface_radiance().is_none();
         let lit = scene.lights.iter().filter(|l| !l.is_dark()).count();
         if lit == 0 && scene.environment.is_black() {
@@ -276,47 +293,6 @@ impl Plan {
         }
     }
 
-    fn decide_colour(&mut self, scene: &Scene) {
-        let dispersive = |m: &Material| m.dielectric().is_some_and(|d| d.ior.is_dispersive());
-        if scene.objects.iter().any(|o| dispersive(&scene.materials[o.material.index()])) {
-            let reason = "only what comes through glass that disperses light gets a wavelength";
-            self.decide("colour", true, "RGB, and one wavelength per chain through a prism", reason);
-        } else {
-            self.decide("colour", false, "RGB", "nothing disperses light: no wavelengths");
-        }
-    }
-
-    fn decide_indirect(&mut self, scene: &Scene) {
-        if scene.render.paths == Paths::Complete {
-            let reason = "`complete` asks for L(D|S)*DS*DS*E";
-            self.decide("indirect light", true, "paths go on from each D", reason);
-            return;
-        }
-        self.decide("indirect light", false, "nothing", "the paths asked for end at the first D");
-        let rough = |m: &Material| !m.is_lambertian() && !matches!(m, Material::Phong(_));
-        if scene.objects.iter().any(|o| rough(&scene.materials[o.material.index()])) {
-            self.warn(
-                "rough_shows_lights_only",
-                "rough metal and glass are a D: without `\"paths\": \"complete\"` they show lights and caustics, not other things",
-            );
-        }
-    }
-
-    fn decide_time(&mut self) {
-        if self.moves {
-            let choice = "one moment per eye sample, one per round for its photons";
-            self.decide("time", true, choice, "something moves while the shutter is open");
-        } else {
-            self.decide("time", false, "one instant", "nothing moves: no time samples");
-        }
-    }
-
-    fn decide_structure(&mut self, scene: &Scene) {
-        let structure = scene.geometry.structure();
-        let reason = scene.geometry.structure_reason();
-        self.decide("structure", structure != "list", structure, reason);
-    }
-
     /// How many doublings of the photons per round memory allows and make sense.
     #[must_use]
     pub fn most_photon_shift(&self) -> u32 {
@@ -337,7 +313,7 @@ impl Plan {
         let photons = a_round << self.most_photon_shift();
         let (width, height) = (scene.image.width, scene.image.height);
         let pixels = u64::from(width) * u64::from(height);
-        let film = Film::bytes(width, height);
+        let film = Film::bytes(width, height) + pixels * self.layer_names.len() as u64 * LayerSums::BYTES;
         // A round and its tiles, while it is made, or the ladder of widths, while it is smoothed.
         let passing =
             if self.photons.is_empty() { 2 * film } else { (2 * film).max(pixels * SMOOTHING_BYTES) };

@@ -1,12 +1,12 @@
 //! The method on one screen: pass 1, the photon maps, pass 2, the film; round after round until a stop.
 
-use crate::effort::{Effort, Measured};
+use crate::effort::Effort;
 use crate::film::Film;
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::pass1_light::{Blocks, Tally};
 use crate::pass2_eye::{self, EyeContext, EyeCounts, Footprints};
-use crate::picture::{Picture, PixelError};
+use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::radius::RadiusRule;
 use crate::sampling::{SamplePoint, hash};
@@ -18,10 +18,13 @@ use std::time::Instant;
 
 mod checkpoint;
 mod control;
+mod milestone;
 mod photons;
 
 pub use checkpoint::CheckpointError;
 pub use control::Control;
+
+use milestone::is_milestone;
 
 /// Why a round did not finish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -154,19 +157,14 @@ const MOST_ROUNDS: u32 = 1 << 20;
 /// Fewer rounds tell too little about the error to stop by it.
 const LEAST_ROUNDS: u32 = 2;
 
-/// True for 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, …: at these numbers of rounds the error is estimated and the
-/// render may stop by it. Between them the picture gains too little to be worth the estimate.
-fn is_milestone(rounds: u32) -> bool {
-    rounds.is_power_of_two() || (rounds.is_multiple_of(3) && (rounds / 3).is_power_of_two())
-}
-
 impl Render {
     /// A render that has yet to start.
     #[must_use]
     pub fn new(scene: Arc<Scene>, plan: Plan) -> Self {
         let preview =
             LinearImage { width: scene.image.width, height: scene.image.height, pixels: Vec::new() };
-        let film = Film::new(scene.image.width, scene.image.height, scene.render.caustics);
+        let film =
+            Film::new(scene.image.width, scene.image.height, scene.render.caustics, plan.layer_names.len());
         let windows = vec![Tally::default(); plan.photons.len()];
         let time = PassTime::default();
         Self {
@@ -204,6 +202,7 @@ impl Render {
             scene: &self.scene,
             plan: &self.plan,
             photons: sent.photons.as_ref(),
+            gathers: true,
             round,
             footprints: &self.footprints,
             film: &self.film,
@@ -217,7 +216,7 @@ impl Render {
         if round == 0 && !self.plan.photons.is_empty() {
             let mut first = self.film.clone();
             first.add_round(film, blocks.count as f32);
-            self.film = self.look_again(first, &mut eye, control)?;
+            self.film = self.look_again(first, sent.photons.as_ref(), &mut eye, control)?;
         } else {
             self.film.add_round(film, blocks.count as f32);
         }
@@ -232,58 +231,12 @@ impl Render {
         Ok(RoundReport { rounds: self.rounds(), error: self.error_estimate(), seconds: self.seconds() })
     }
 
-    /// Adds eye samples to the first round where its own find that they are missing: at borders and in half shadows. A
-    /// whole round more, photons and all, would cost more.
-    fn look_again(
-        &self,
-        mut film: Film,
-        eye: &mut EyeCounts,
-        control: &Control,
-    ) -> Result<Film, RenderError> {
-        let errors = Picture::with_smoothing(&film, None).errors();
-        let samples: Vec<u32> = film.pixels().iter().map(|p| p.samples).collect();
-        let measured = self.measured(&film, (&errors, &samples), eye);
-        let effort = Effort::second_look(&measured, hash(self.scene.render.seed, u64::MAX));
-        let context = EyeContext {
-            scene: &self.scene,
-            plan: &self.plan,
-            photons: None,
-            round: film.rounds(),
-            footprints: &self.footprints,
-            film: &film,
-            effort: &effort,
-        };
-        let (more, counts) = pass2_eye::trace_image(&context, control)?;
-        film.add_samples(more);
-        eye.add(&counts);
-        Ok(film)
-    }
-
-    /// What decides on the effort.
-    fn measured<'a>(
-        &self,
-        film: &Film,
-        (errors, samples): (&'a [PixelError], &'a [u32]),
-        eye: &EyeCounts,
-    ) -> Measured<'a> {
-        let sampled: u64 = samples.iter().map(|&n| 2 * u64::from(n)).sum();
-        let photon_rays: u64 = self.windows.iter().map(|t| t.rays).sum();
-        let weight = film.photon_weight();
-        Measured {
-            errors,
-            width: film.size().0,
-            samples,
-            photon_weight: weight,
-            rays_per_block: if weight > 0.0 { photon_rays as f32 / weight } else { 0.0 },
-            rays_per_sample: (eye.eye_rays + eye.shadow_rays) as f32 / sampled.max(1) as f32,
-        }
-    }
-
     /// Traces the pixels' footprints once, if photons are counted on them. A progressive radius is the classic
     /// method instead: photons are looked up point by point, and nothing is smoothed.
     fn trace_footprints(&mut self) {
         let gathered = !self.plan.photons.is_empty() && self.plan.caustics == Some(Caustics::Photons);
-        let counted = gathered && self.plan.radius == RadiusRule::Pixel;
+        let seen = self.plan.classes.contains(PathClass::Caustic);
+        let counted = gathered && seen && self.plan.radius == RadiusRule::Pixel;
         if counted && self.footprints.size().0 == 0 {
             self.footprints = Footprints::trace(&self.scene, &self.plan.eye_media);
         }
@@ -304,24 +257,6 @@ impl Render {
         }
         let seed = hash(hash(self.scene.render.seed, MOMENTS), half);
         SamplePoint::new(seed, self.rounds()).get(0)
-    }
-
-    /// Estimates the error where the number of rounds is a milestone, and decides what the next rounds do.
-    fn at_milestone(&mut self) {
-        if !is_milestone(self.rounds()) {
-            return;
-        }
-        let picture = Picture::new(&self.film, &self.footprints);
-        let errors = picture.errors();
-        let samples: Vec<u32> = self.film.pixels().iter().map(|p| p.samples).collect();
-        let measured = self.measured(&self.film, (&errors, &samples), &self.eye);
-        let key = hash(self.scene.render.seed, u64::from(self.rounds()));
-        // A round at most doubles what was done before: no single one overruns a limit of time by far.
-        let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);
-        self.effort = Effort::decide(&measured, most_shift, key);
-        self.error = Some(PixelError::root_mean(&errors));
-        self.preview = picture.image();
-        self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));
     }
 
     /// Why the render is finished; `None` while it is not.
@@ -394,7 +329,7 @@ impl Render {
     pub fn picture(&self) -> Picture<'_> {
         match &self.smoothing {
             Some((rounds, smoothing)) if *rounds == self.rounds() => {
-                Picture::with_smoothing(&self.film, smoothing.as_ref())
+                Picture::with_smoothing(&self.film, &self.footprints, smoothing.as_ref())
             }
             _ => Picture::new(&self.film, &self.footprints),
         }

@@ -27,6 +27,8 @@ pub struct Smoothing {
     /// Estimated squared error of the caustic radiance that is left, mean over channels; `None` where the
     /// pixel stays as it was gathered.
     pub squared_error: Vec<Option<f32>>,
+    /// The width chosen for each pixel; 0 where it stays as it was gathered.
+    level: Vec<u8>,
 }
 
 /// Segments with fewer pixels tell too little about noise and blur.
@@ -52,10 +54,7 @@ pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
     }
     let sum: f32 = film.means().map(|means| mean_channel(means.total())).sum();
     let mean = sum / samples.len() as f32;
-    let filtered: Vec<(Segment, Ladder)> = segment::segments(footprints)
-        .into_par_iter()
-        .filter_map(|segment| segment.near(ladder::MOST_REACH, |i| samples[i].irradiance != [Vec3::ZERO; 2]))
-        .filter(|segment| segment.pixels.len() >= LEAST_PIXELS)
+    let filtered: Vec<(Segment, Ladder)> = lit_segments(footprints, &samples)
         .map(|segment| {
             let ladder = Ladder::climb(&segment, &samples, 0.1 * mean);
             (segment, ladder)
@@ -64,6 +63,7 @@ pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
     let mut correction = vec![Vec3::ZERO; samples.len()];
     let mut squared_error = vec![None; samples.len()];
     let mut lent: Vec<Lent> = samples.iter().map(Lent::raw).collect();
+    let mut level = vec![0; samples.len()];
     for (segment, ladder) in &filtered {
         for &pixel in &segment.pixels {
             let sample = &samples[pixel as usize];
@@ -73,6 +73,7 @@ pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
             correction[pixel as usize] = sample.gain * change;
             squared_error[pixel as usize] =
                 Some(choice.squared_error * mean_channel(sample.gain * sample.gain));
+            level[pixel as usize] = choice.level;
             lent[pixel as usize] = Lent { change, squared_error: choice.squared_error };
         }
     }
@@ -83,7 +84,38 @@ pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
         let error = squared_error[loan.borrower as usize].get_or_insert(0.0);
         *error += lent.squared_error * mean_channel(gain * gain);
     }
-    Some(Smoothing { correction, squared_error })
+    Some(Smoothing { correction, squared_error, level })
+}
+
+/// What the same widths add to a part of the irradiance, per pixel: radiance. What they add to all parts is the whole's
+/// correction.
+#[must_use]
+pub fn smooth_part(
+    film: &Film,
+    footprints: &Footprints,
+    smoothing: &Smoothing,
+    irradiance: &[Vec3],
+) -> Vec<Vec3> {
+    let samples: Vec<Sample> = film.means().map(|means| Sample::of(&means)).collect();
+    let mut correction = vec![Vec3::ZERO; samples.len()];
+    let segments: Vec<Segment> = lit_segments(footprints, &samples).collect();
+    for segment in &segments {
+        ladder::filter_part(segment, irradiance, &smoothing.level, |pixel, smooth| {
+            correction[pixel] = samples[pixel].gain * (smooth - irradiance[pixel]);
+        });
+    }
+    correction
+}
+
+/// The pieces of surface that are large enough and have light.
+fn lit_segments<'a>(
+    footprints: &Footprints,
+    samples: &'a [Sample],
+) -> impl ParallelIterator<Item = Segment> + 'a {
+    segment::segments(footprints)
+        .into_par_iter()
+        .filter_map(|segment| segment.near(ladder::MOST_REACH, |i| samples[i].irradiance != [Vec3::ZERO; 2]))
+        .filter(|segment| segment.pixels.len() >= LEAST_PIXELS)
 }
 
 /// What a pixel's irradiance is to those that borrow it.

@@ -307,9 +307,9 @@ impl RunningRender {
                 bytes: encode_exr(&image).map_err(|error| error.to_string())?,
             },
         ];
-        for &class in self.render.scene().render.paths.classes() {
-            let bytes = self.png(&picture.layer(class))?;
-            outputs.push(Output { name: format!("layers/{}.png", class.name()), bytes });
+        for layer in self.render.layers() {
+            let bytes = self.png(&picture.part(&layer))?;
+            outputs.push(Output { name: format!("layers/{}.png", layer.name()), bytes });
         }
         outputs.push(Output { name: "error.png".into(), bytes: self.error_map(&picture)? });
         Ok(outputs)

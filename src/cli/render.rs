@@ -4,6 +4,7 @@ use super::Failure;
 use super::files::{Loaded, cannot, format_of, load_scene, save, save_image};
 use super::progress::Reporter;
 use clap::Args;
+use nephroid::light_path::PathsError;
 use nephroid::plan::Plan;
 use nephroid::render::{Control, Render, RenderError};
 use nephroid::report;
@@ -18,7 +19,8 @@ pub(super) struct RenderArguments {
     /// Where the picture goes; png is tone-mapped, exr and npy hold linear radiance. May be repeated.
     #[arg(short, long, value_name = "FILE", default_value = "out.png")]
     output: Vec<PathBuf>,
-    /// Which light paths are computed: `whitted` or `caustics`.
+    /// Which light paths are computed: `whitted`, `caustics`, `complete`, or an expression over L, D, S and E, as
+    /// `LS+DS*E`.
     #[arg(long, value_name = "EXPR", value_parser = parse_paths)]
     paths: Option<Paths>,
     /// Which estimator computes the caustics: `photons`, `backward` or `forward`.
@@ -42,7 +44,7 @@ pub(super) struct RenderArguments {
     /// Size of the picture in place of the scene's.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
-    /// Also write each class of light paths to its own exr file in this folder.
+    /// Also write each class of light paths, and each layer that the scene names, to its own exr file in this folder.
     #[arg(long, value_name = "DIR")]
     layers: Option<PathBuf>,
     /// Write what the render did as JSON.
@@ -100,8 +102,8 @@ fn run_rounds(render: &mut Render, control: &Control, reporter: &Reporter) -> Re
 impl RenderArguments {
     /// Puts what was typed in place of what the scene says.
     fn apply(&self, scene: &mut Scene) {
-        if let Some(paths) = self.paths {
-            scene.render.paths = paths;
+        if let Some(paths) = &self.paths {
+            scene.render.paths = paths.clone();
         }
         if let Some(caustics) = self.caustics {
             scene.render.caustics = caustics;
@@ -127,9 +129,10 @@ impl RenderArguments {
         }
         if let Some(folder) = &self.layers {
             std::fs::create_dir_all(folder).map_err(|e| cannot("make", folder, &e))?;
-            for &class in render.scene().render.paths.classes() {
-                let path = folder.join(format!("{}.exr", class.name()));
-                save_image(&path, &render.layer(class), settings)?;
+            let picture = render.picture();
+            for layer in render.layers() {
+                let path = folder.join(format!("{}.exr", layer.name()));
+                save_image(&path, &picture.part(&layer), settings)?;
             }
         }
         if let Some(path) = &self.stats {
@@ -151,7 +154,7 @@ fn peak_memory_bytes() -> Option<u64> {
 }
 
 fn parse_paths(text: &str) -> Result<Paths, String> {
-    text.parse().map_err(|e: nephroid::scene::UnknownPaths| e.to_string())
+    text.parse().map_err(|e: PathsError| e.to_string())
 }
 
 fn parse_caustics(text: &str) -> Result<Caustics, String> {

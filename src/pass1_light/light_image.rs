@@ -14,6 +14,7 @@ use super::emit::{Aim, Emission};
 use super::energy::Tally;
 use super::walk::{PhotonWalk, Step};
 use crate::geometry::SheetId;
+use crate::light_path::Kind;
 use crate::photon_map::Photon;
 use crate::sampling::{SamplePoint, hash};
 use crate::scene::Camera;
@@ -30,6 +31,8 @@ pub struct LightImage {
     pub normal: Vec3,
     /// The sheet of surface it lies on.
     pub sheet: SheetId,
+    /// Which light it is, and what it has met.
+    pub kind: Kind,
     /// Power per channel, W.
     pub power: Vec3,
 }
@@ -167,8 +170,8 @@ impl ImageTracer<'_> {
         let shift = bend * MEAN_OVER_PROBE + lean(&corners, &powers);
         let corners = corners.map(|corner| corner + shift);
         let mean = powers.iter().sum::<Vec3>() / 4.0 + (probe.power - expected(powers)) * MEAN_OVER_PROBE;
-        let Photon { direction, normal, sheet, .. } = *probe;
-        Some(LightImage { corners, direction, normal, sheet, power: mean * (part.side * part.side) })
+        let Photon { direction, normal, sheet, kind, .. } = *probe;
+        Some(LightImage { corners, direction, normal, sheet, kind, power: mean * (part.side * part.side) })
     }
 
     /// True if all corners lie beyond one border of the picture.

@@ -4,6 +4,7 @@ use super::emit::EmittedPhoton;
 use super::energy::Tally;
 use super::window::Window;
 use crate::geometry::{Hit, Ray};
+use crate::light_path::{Kind, Kinds};
 use crate::media::Media;
 use crate::optics::{Arrival, Event, Interaction, Outcome, resting_scale, transmittance};
 use crate::photon_map::Photon;
@@ -36,12 +37,26 @@ pub(super) struct PhotonWalk<'a> {
     caster: Option<ObjectId>,
     /// What the light is inside of.
     media: Media,
+    /// What photons are told apart by, and which of them are asked for.
+    kinds: Option<&'a Kinds>,
 }
 
 impl<'a> PhotonWalk<'a> {
     /// For the photons of a window.
-    pub(super) fn new(scene: &'a Scene, window: &Window) -> Self {
-        Self { scene, caster: window.caster, media: window.media }
+    pub(super) fn new(scene: &'a Scene, window: &'a Window) -> Self {
+        Self { scene, caster: window.caster, media: window.media, kinds: window.kinds.as_ref() }
+    }
+
+    /// The kind of a photon that has met this many S; `None` if it is not asked for.
+    #[inline]
+    fn kind(&self, specular: u32) -> Option<Kind> {
+        self.kinds.map_or(Some(0), |kinds| kinds.after(specular))
+    }
+
+    /// Whether a photon that has met this many S may still be asked for.
+    #[inline]
+    fn has_aims(&self, specular: u32) -> bool {
+        self.kinds.is_none_or(|kinds| kinds.any_from(specular))
     }
 
     /// True for an object that a photon may meet first.
@@ -90,11 +105,14 @@ impl<'a> PhotonWalk<'a> {
             }
             let interaction = arrival.interact(|| spectrum::pick(sample.get(WAVELENGTH_DIMENSION)));
             // What rests on the first surface is direct light: not the photons' part.
-            if bounce > 0 && arrival.material().has_diffuse() {
+            if bounce > 0
+                && arrival.material().has_diffuse()
+                && let Some(kind) = self.kind(bounce)
+            {
                 let resting = power * (Vec3::ONE - interaction.share());
                 tally.stored += 1;
                 tally.energy.stored += resting.as_dvec3();
-                tell(Step::Rests(at_rest(&ray, &hit, power)));
+                tell(Step::Rests(at_rest(&ray, &hit, power, kind)));
                 power -= resting;
             }
             let dimension = event_dimension(FIRST_EVENT_DIMENSION, bounce);
@@ -103,7 +121,8 @@ impl<'a> PhotonWalk<'a> {
                 return;
             };
             tell(Step::Meets(hit.object, outcome.event));
-            let kept = left * weight;
+            // What nobody asks for any more ends here, as if it were taken up.
+            let kept = if self.has_aims(bounce + 1) { left * weight } else { Vec3::ZERO };
             tally.energy.absorbed += power.as_dvec3() - kept.as_dvec3();
             power = kept;
             if !survive(&mut power, first_power, || sample.get(dimension + 1), tally) {
@@ -149,12 +168,13 @@ fn survive(power: &mut Vec3, first_power: f32, u: impl Fn() -> f32, tally: &mut 
     true
 }
 
-fn at_rest(ray: &Ray, hit: &Hit, power: Vec3) -> Photon {
+fn at_rest(ray: &Ray, hit: &Hit, power: Vec3, kind: Kind) -> Photon {
     Photon {
         position: hit.surface.point,
         direction: ray.direction,
         normal: hit.surface.normal,
         sheet: hit.sheet,
+        kind,
         power: power * resting_scale(ray.direction, &hit.surface),
     }
 }

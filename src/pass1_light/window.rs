@@ -5,6 +5,7 @@
 
 use super::guide::Guide;
 use crate::geometry::{Bounds, Geometry, HullPoint};
+use crate::light_path::Kinds;
 use crate::media::Media;
 use crate::scene::{Aiming, Light, LightId, ObjectId, Scene, SphereLight};
 use glam::{Vec2, Vec3};
@@ -31,6 +32,8 @@ pub struct Window {
     pub region: Region,
     /// Where in it the photons come from that arrive, if a pilot has found that out.
     pub guide: Option<Guide>,
+    /// What its photons are told apart by; `None` if they need not be.
+    pub kinds: Option<Kinds>,
 }
 
 /// The shape of a window.
@@ -91,7 +94,7 @@ pub fn windows(scene: &Scene) -> Vec<Window> {
                 Source::Light(id) => region(&scene.lights[id.index()], &scene.geometry, caster, hull),
                 Source::Environment => enclosing_disc(&scene.geometry.object_bounds(caster)),
             };
-            windows.push(Window { source, media, caster: Some(caster), region, guide: None });
+            windows.push(Window { source, media, caster: Some(caster), region, guide: None, kinds: None });
         }
     }
     windows
@@ -117,7 +120,7 @@ fn everywhere(scene: &Scene, source: Source) -> Window {
             _ => Region::AllDirections,
         },
     };
-    Window { source, media: media_around(scene, source), caster: None, region, guide: None }
+    Window { source, media: media_around(scene, source), caster: None, region, guide: None, kinds: None }
 }
 
 fn region(light: &Light, geometry: &Geometry, caster: ObjectId, hull: &[HullPoint]) -> Region {

@@ -6,12 +6,13 @@ use super::footprint::view_code;
 use super::specular::{Branch, EyeWalk, Lookups, Scattered};
 use crate::bsdf::Bsdf;
 use crate::film::PixelSums;
-use crate::light_path::PathClass;
+use crate::light_path::{Bounce, Kind, PICTURE, PathClass};
 use crate::optics::Arrival;
-use crate::photon_map::{Lookup, Nearest};
+use crate::pass1_light::{RoundPhotons, Source};
+use crate::photon_map::{Incoming, Lookup, Nearest};
 use crate::radius::{PIXEL, Reach};
 use crate::sampling::hash;
-use crate::scene::{LightPoint, Paths};
+use crate::scene::LightPoint;
 use glam::Vec3;
 
 /// Sobol dimensions, of a stream of its own, that draw the direction in which a path goes on, its lobe, and whether.
@@ -40,59 +41,77 @@ impl EyeWalk<'_> {
     pub(super) fn arrive(&mut self, branch: &Branch, arrival: &Arrival<'_>, sums: &mut PixelSums) -> bool {
         self.see_emitter(branch, arrival, sums);
         let Some(bsdf) = Bsdf::new(arrival) else { return false };
-        let scene = self.context.scene;
         let seen = branch.scattered.map_or(0, |s| s.count) + 1;
-        if seen > 1 && scene.render.paths != Paths::Complete {
-            // The paths asked for end at the first D.
+        if seen > 1 && !self.wants_more(branch) {
+            // The paths asked for end at the last D.
             return true;
         }
-        let sample = self.sample.branch(branch.key);
-        let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf: &bsdf, time: branch.ray.time };
-        if self.direct {
-            let direct = direct_light(&receiver, sample, &mut self.counts.shadow_rays);
-            let classes = &mut sums.halves[self.half].classes;
-            classes.add(PathClass::with_light_after(seen), branch.throughput * direct);
-        }
+        let mut branch = *branch;
+        self.extend(&mut branch, Bounce::Diffuse);
+        self.see_lights(&branch, arrival, &bsdf, sums);
         if seen > 1 {
-            if self.context.photons.is_some() {
-                let radiance = branch.throughput * self.look_up(branch, arrival, &bsdf, INDIRECT_WIDTH);
-                sums.halves[self.half].classes.add(PathClass::Indirect, radiance);
-            }
+            self.see_looked_up(&branch, arrival, (&bsdf, INDIRECT_WIDTH), PathClass::Indirect, sums);
         } else {
-            self.see_photons(branch, arrival, &bsdf, sums);
+            self.see_photons(&branch, arrival, &bsdf, sums);
         }
-        self.leave(branch, arrival, &bsdf, seen);
+        self.leave(&branch, arrival, &bsdf, seen);
         true
     }
 
+    /// The lights that the point sees.
+    fn see_lights(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, sums: &mut PixelSums) {
+        let class = PathClass::with_light_after(branch.scattered.map_or(0, |s| s.count) + 1);
+        if !self.direct || !self.wants_lights(branch, class) {
+            return;
+        }
+        let (scene, sample) = (self.context.scene, self.sample.branch(branch.key));
+        let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf, time: branch.ray.time };
+        let mut shadow_rays = 0;
+        if self.context.plan.language.is_none() {
+            let mut direct = Vec3::ZERO;
+            direct_light(&receiver, sample, &mut shadow_rays, |_, radiance| direct += radiance);
+            self.add(class, PICTURE, branch.throughput * direct, sums);
+        } else {
+            direct_light(&receiver, sample, &mut shadow_rays, |source, radiance| {
+                let pictures = match source {
+                    Source::Light(light) => self.pictures_of_light(branch, class, light),
+                    Source::Environment => self.pictures_of_environment(branch, class),
+                };
+                self.add(class, pictures, branch.throughput * radiance, sums);
+            });
+        }
+        self.counts.shadow_rays += shadow_rays;
+    }
+
     /// What the surface itself gives, if this estimator is the one that counts it.
-    fn see_emitter(&self, branch: &Branch, arrival: &Arrival<'_>, sums: &mut PixelSums) {
+    fn see_emitter(&mut self, branch: &Branch, arrival: &Arrival<'_>, sums: &mut PixelSums) {
         let scene = self.context.scene;
         let surface = &arrival.hit.surface;
-        let classes = &mut sums.halves[self.half].classes;
         if branch.scattered.is_none() {
-            classes.add(PathClass::Emitted, branch.throughput * arrival.material().glow(surface.uv));
+            let radiance = branch.throughput * arrival.material().glow(surface.uv);
+            self.add(PathClass::Emitted, self.pictures_of_glow(branch), radiance, sums);
         }
-        let Some(light) = scene.objects[arrival.hit.object.index()].emitter else { return };
-        let light = &scene.lights[light.index()];
+        let Some(id) = scene.objects[arrival.hit.object.index()].emitter else { return };
+        let light = &scene.lights[id.index()];
         let Some(radiance) = light.surface_radiance() else { return };
         if arrival.direction.dot(surface.normal) > 0.0 {
             return;
         }
-        match branch.scattered {
-            None => classes.add(PathClass::Emitted, branch.throughput * radiance),
+        let (class, weight) = match branch.scattered {
+            None => (PathClass::Emitted, 1.0),
             Some(Scattered { straight: true, pdf: Some(pdf), count, point }) => {
                 let at = LightPoint { point: surface.point, normal: surface.normal, error: surface.error };
                 let other = density_toward(light, point, &at).unwrap_or(0.0);
-                let weight = power_heuristic(pdf, other);
-                classes.add(PathClass::with_light_after(count), branch.throughput * radiance * weight);
+                (PathClass::with_light_after(count), power_heuristic(pdf, other))
             }
             // Light over mirrors or glass: the photons' part, unless rays are to find it.
             Some(Scattered { straight: false, count, .. }) if self.goes_backward() => {
-                classes.add(PathClass::with_caustic_after(count), branch.throughput * radiance);
+                (PathClass::with_caustic_after(count), 1.0)
             }
-            Some(_) => {}
-        }
+            Some(_) => return,
+        };
+        let pictures = self.pictures_of_light(branch, class, id);
+        self.add(class, pictures, branch.throughput * radiance * weight, sums);
     }
 
     /// The photons at the first D: counted on the pixel's footprint, if this is it, else looked up.
@@ -112,15 +131,43 @@ impl EyeWalk<'_> {
             Lookups::Nowhere => {}
             Lookups::OffFootprint if footprint => {}
             Lookups::OffFootprint | Lookups::Everywhere => {
-                let radiance = branch.throughput * self.look_up(branch, arrival, bsdf, 1.0);
-                sums.halves[self.half].classes.add(PathClass::Caustic, radiance);
+                self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums);
             }
         }
     }
 
-    /// Radiance by density estimation around the point, with a kernel of about a pixel, times `wider`.
-    fn look_up(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, wider: f32) -> Vec3 {
-        let Some(photons) = self.context.photons else { return Vec3::ZERO };
+    /// The photons around the point, with a kernel of about a pixel times a factor; apart where they are in different
+    /// pictures.
+    fn see_looked_up(
+        &mut self,
+        branch: &Branch,
+        arrival: &Arrival<'_>,
+        (bsdf, wider): (&Bsdf, f32),
+        class: PathClass,
+        sums: &mut PixelSums,
+    ) {
+        let Some(photons) = self.context.photons else { return };
+        let Some(language) = &self.context.plan.language else {
+            let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), |_| true);
+            self.add(class, PICTURE, branch.throughput * radiance, sums);
+            return;
+        };
+        for &pictures in language.parts(branch.trail) {
+            let pick = |kind: Kind| language.pictures(branch.trail, kind) == pictures;
+            let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), pick);
+            self.add(class, pictures, branch.throughput * radiance, sums);
+        }
+    }
+
+    /// Radiance by density estimation around the point, of the photons that are picked.
+    fn look_up(
+        &mut self,
+        photons: &RoundPhotons,
+        branch: &Branch,
+        arrival: &Arrival<'_>,
+        (bsdf, wider): (&Bsdf, f32),
+        pick: impl Fn(Kind) -> bool,
+    ) -> Vec3 {
         let hit = arrival.hit;
         let pixel = self.context.scene.camera.pixel_width(branch.travelled + hit.t);
         let point = hit.surface.point;
@@ -131,7 +178,9 @@ impl EyeWalk<'_> {
             radius,
             both_sides: bsdf.transmits(),
         };
-        let per_irradiance = |incident: Vec3| bsdf.per_irradiance(incident);
+        let per_irradiance = |incoming: Incoming| {
+            if pick(incoming.kind) { bsdf.per_irradiance(incoming.direction) } else { Vec3::ZERO }
+        };
         let map = &photons.maps[self.half];
         self.counts.lookups += 1;
         match self.reach {
@@ -156,7 +205,7 @@ impl EyeWalk<'_> {
 
     /// Goes on from a D: if all paths are asked for, or if rays are what finds the lights in its highlights.
     fn leave(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, seen: u32) {
-        let complete = self.context.scene.render.paths == Paths::Complete;
+        let complete = self.wants_more(branch);
         let highlights = bsdf.albedo().is_none() && self.context.plan.lights_can_be_met;
         let first_of_all = seen == 1 && (highlights || self.goes_backward());
         if !(complete || first_of_all) || seen >= MOST_DIFFUSE {

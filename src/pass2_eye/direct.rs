@@ -4,8 +4,9 @@
 use crate::bsdf::Bsdf;
 use crate::geometry::{Ray, SurfacePoint, offset_origin};
 use crate::optics::transmittance;
+use crate::pass1_light::Source;
 use crate::sampling::{SamplePoint, cosine_hemisphere};
-use crate::scene::{Environment, Light, Scene, SpotLight};
+use crate::scene::{Environment, Light, LightId, Scene, SpotLight};
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
@@ -89,15 +90,20 @@ pub(super) fn power_heuristic(pdf: f32, other: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// Radiance from all lights at a D, one shadow ray each unless the scene asks for more.
-pub(super) fn direct_light(receiver: &Receiver<'_>, sample: SamplePoint, shadow_rays: &mut u64) -> Vec3 {
+/// Tells the radiance from each light at a D, one shadow ray each unless the scene asks for more.
+pub(super) fn direct_light(
+    receiver: &Receiver<'_>,
+    sample: SamplePoint,
+    shadow_rays: &mut u64,
+    mut tell: impl FnMut(Source, Vec3),
+) {
     let scene = receiver.scene;
-    let mut sum = Vec3::ZERO;
     for (i, light) in scene.lights.iter().enumerate() {
+        let source = Source::Light(LightId(i as u32));
         let sample = if i == 0 { sample } else { sample.branch(i as u64) };
         let mut strata = Strata { receiver, light, shadow_rays };
         if let Some(radiance) = strata.radiance(sample) {
-            sum += radiance;
+            tell(source, radiance);
             continue;
         }
         let incident = match light {
@@ -109,10 +115,10 @@ pub(super) fn direct_light(receiver: &Receiver<'_>, sample: SamplePoint, shadow_
             Light::Sphere(sphere) => from_sphere(receiver, sphere, sample.get_2d(2)),
             Light::Mesh(mesh) => from_mesh(receiver, mesh, sample.get_2d(2)),
         };
-        sum += receiver.visible(incident, shadow_rays);
+        tell(source, receiver.visible(incident, shadow_rays));
     }
     let incident = from_environment(receiver, &scene.environment, sample.get_2d(4));
-    sum + receiver.visible(incident, shadow_rays)
+    tell(Source::Environment, receiver.visible(incident, shadow_rays));
 }
 
 fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Option<Incident> {

@@ -42,6 +42,8 @@ pub struct Footprint {
     pub only_way: bool,
     /// True if it is seen without any S between.
     pub direct: bool,
+    /// Number of S on the way.
+    pub specular: u8,
 }
 
 /// Where one ray of the main way ends.
@@ -52,6 +54,7 @@ struct Landing {
     sheet: SheetId,
     key: u64,
     only_way: bool,
+    specular: u8,
 }
 
 /// Names a sheet seen by certain reflections and refractions. A wall seen through water and the same wall above
@@ -62,7 +65,7 @@ pub(super) fn view_code(sheet: SheetId, way: u64) -> u32 {
 }
 
 /// More S than this on the main way, and a pixel is gathered point by point.
-const MOST_BOUNCES: u32 = 16;
+const MOST_BOUNCES: u8 = 16;
 
 /// Corners whose normals differ by more than this lie on different faces (cosine of 18°).
 const SAME_FACE: f32 = 0.95;
@@ -155,7 +158,8 @@ impl Footprint {
         }
         let only_way = around.iter().all(|l| l.only_way);
         let view = view_code(first.sheet, first.key);
-        Some(Self { corners, normal, sheet: first.sheet, view, area, only_way, direct: first.key == 1 })
+        let Landing { sheet, specular, .. } = first;
+        Some(Self { corners, normal, sheet, view, area, only_way, direct: first.key == 1, specular })
     }
 
     /// Middle of the corners.
@@ -172,7 +176,7 @@ fn land(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
     let mut media = *eye_media;
     let mut key = 1_u64;
     let mut only_way = true;
-    for _ in 0..MOST_BOUNCES {
+    for specular in 0..MOST_BOUNCES {
         let hit = scene.geometry.closest_hit(&ray)?;
         if scene.geometry.may_meet_moving(&ray, hit.t) {
             return None;
@@ -184,7 +188,7 @@ fn land(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
         if material.has_diffuse() {
             let normal = facing(surface, ray.direction);
             only_way &= interaction.reflected.is_none() && interaction.refracted.is_none();
-            let landing = Landing { point: surface.point, normal, sheet: hit.sheet, key, only_way };
+            let landing = Landing { point: surface.point, normal, sheet: hit.sheet, key, only_way, specular };
             return material.is_lambertian().then_some(landing);
         }
         only_way &= interaction.reflected.is_none() || interaction.refracted.is_none();

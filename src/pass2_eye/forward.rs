@@ -4,7 +4,7 @@
 use super::specular::LENS_DIMENSION;
 use crate::bsdf::Bsdf;
 use crate::film::RoundFilm;
-use crate::light_path::PathClass;
+use crate::light_path::{PICTURE, PathClass, Pictures};
 use crate::optics::{Arrival, transmittance};
 use crate::pass1_light::RoundLists;
 use crate::photon_map::Photon;
@@ -26,6 +26,8 @@ const ROUNDING: f32 = 16.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connected {
     halves: [Vec<DVec3>; 2],
+    /// Those of each named layer, sum of both halves.
+    layers: Vec<Vec<DVec3>>,
     /// Rays traced.
     pub rays: u64,
 }
@@ -34,12 +36,14 @@ pub struct Connected {
 struct Splat {
     pixel: u32,
     radiance: Vec3,
+    pictures: Pictures,
 }
 
 impl Connected {
     /// Adds what the photons brought to a round of eye samples.
     pub fn add_to(&self, film: &mut RoundFilm) {
         self.halves.iter().enumerate().for_each(|(half, radiance)| film.add_caustics(half, radiance));
+        self.layers.iter().enumerate().for_each(|(layer, radiance)| film.add_to_layer(layer, radiance));
     }
 }
 
@@ -56,7 +60,9 @@ pub fn connect(
 ) -> Result<Connected, RenderError> {
     const FORWARD: u64 = 4;
     let (width, height) = (scene.image.width, scene.image.height);
-    let mut connected = Connected { halves: [Vec::new(), Vec::new()], rays: 0 };
+    let pixels = width as usize * height as usize;
+    let layers = vec![vec![DVec3::ZERO; pixels]; plan.layer_names.len()];
+    let mut connected = Connected { halves: [Vec::new(), Vec::new()], layers, rays: 0 };
     for (half, list) in photons.halves.iter().enumerate() {
         let seed = hash(hash(hash(scene.render.seed, FORWARD), u64::from(round)), half as u64);
         let eye = Eye { scene, plan, seed, time: photons.times[half] };
@@ -69,9 +75,17 @@ pub fn connect(
                 Ok((first..).zip(photons).filter_map(|(i, photon)| eye.see(photon, i as u32)).collect())
             })
             .collect::<Result<Vec<Vec<Splat>>, RenderError>>()?;
-        let mut sums = vec![DVec3::ZERO; width as usize * height as usize];
+        let mut sums = vec![DVec3::ZERO; pixels];
         for splat in batches.iter().flatten() {
-            sums[splat.pixel as usize] += splat.radiance.as_dvec3();
+            let (pixel, radiance) = (splat.pixel as usize, splat.radiance.as_dvec3());
+            if splat.pictures & PICTURE != 0 {
+                sums[pixel] += radiance;
+            }
+            for (layer, sums) in connected.layers.iter_mut().enumerate() {
+                if splat.pictures >> (layer + 1) & 1 == 1 {
+                    sums[pixel] += radiance;
+                }
+            }
         }
         if let Some(i) = sums.iter().position(|sum| !sum.is_finite()) {
             let (x, y) = (i as u32 % width, i as u32 / width);
@@ -96,6 +110,10 @@ impl Eye<'_> {
     /// of the surface, `cosθ / (d² ω)` for pixels of solid angle ω.
     fn see(&self, photon: &Photon, index: u32) -> Option<Splat> {
         let scene = self.scene;
+        let pictures = self.pictures(photon);
+        if pictures == 0 {
+            return None;
+        }
         let u = SamplePoint::new(self.seed, index).get_2d(LENS_DIMENSION);
         let view = scene.camera.project(photon.position, u)?;
         let ray = view.ray.at_time(self.time);
@@ -110,6 +128,16 @@ impl Eye<'_> {
         let left = transmittance(arrival.media.absorption(scene), hit.t);
         let radiance = photon.power * value * left * (cosine * view.pixels_per_area);
         let pixel = view.raster.as_uvec2();
-        (radiance != Vec3::ZERO).then_some(Splat { pixel: pixel.y * scene.image.width + pixel.x, radiance })
+        let pixel = pixel.y * scene.image.width + pixel.x;
+        (radiance != Vec3::ZERO).then_some(Splat { pixel, radiance, pictures })
+    }
+
+    /// The pictures that hold what the eye sees of a photon directly.
+    fn pictures(&self, photon: &Photon) -> Pictures {
+        match &self.plan.language {
+            Some(language) => language.pictures(language.first_diffuse(0), photon.kind),
+            None if self.plan.classes.contains(PathClass::Caustic) => PICTURE,
+            None => 0,
+        }
     }
 }

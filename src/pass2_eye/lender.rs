@@ -45,7 +45,8 @@ impl EyeWalk<'_> {
     fn lender(&self, view: u32, arrival: &Arrival<'_>) -> Option<u32> {
         let footprints = self.context.footprints;
         let (count, width) = footprints.size();
-        if count == 0 || self.context.plan.moves {
+        // What moves is not always where it is now, and named layers take apart what a loan holds together.
+        if count == 0 || self.context.plan.moves || self.context.plan.language.is_some() {
             return None;
         }
         let (column, row) = (self.pixel as usize % width, self.pixel as usize / width);

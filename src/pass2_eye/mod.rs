@@ -4,6 +4,7 @@ mod arrive;
 mod direct;
 mod footprint;
 mod forward;
+mod layers;
 mod lender;
 mod outline;
 mod specular;
@@ -15,13 +16,15 @@ pub use specular::EyeCounts;
 pub use spread::Irradiance;
 
 use crate::effort::Effort;
-use crate::film::{Film, Loan, PixelSums, RoundFilm};
-use crate::pass1_light::RoundPhotons;
+use crate::film::{Film, LayerSums, Loan, PixelSums, RoundFilm};
+use crate::light_path::{Kind, PICTURE, PathClass, Pictures};
+use crate::pass1_light::{RoundPhotons, Spread};
+use crate::photon_map::PhotonMap;
 use crate::plan::Plan;
 use crate::render::{Control, RenderError};
 use crate::sampling::{SamplePoint, hash};
 use crate::scene::{Caustics, Scene};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use specular::{EyeWalk, Lookups};
 
@@ -34,8 +37,10 @@ pub struct EyeContext<'a> {
     pub scene: &'a Scene,
     /// What is computed.
     pub plan: &'a Plan,
-    /// This round's photons, if pass 1 ran; `None` also where eye samples alone are added to a round.
+    /// This round's photons, if pass 1 ran.
     pub photons: Option<&'a RoundPhotons>,
+    /// False where eye samples are added to a round whose photons were gathered before.
+    pub gathers: bool,
     /// Number of the round.
     pub round: u32,
     /// The pixels' areas on what they show.
@@ -55,10 +60,9 @@ pub fn trace_image(
     control: &Control,
 ) -> Result<(RoundFilm, EyeCounts), RenderError> {
     let image = context.scene.image;
-    let direct = context.photons.map(|photons| {
-        let half =
-            |i: usize| Irradiance::gather(&context.scene.camera, context.footprints, &photons.spreads[i]);
-        <[Irradiance; 2]>::from(rayon::join(|| half(0), || half(1)))
+    let direct = context.photons.filter(|_| context.gathers).map(|photons| {
+        let half = |i: usize| seen_directly(context, &photons.spreads[i]);
+        <[Vec<Seen>; 2]>::from(rayon::join(|| half(0), || half(1)))
     });
     let (across, down) = (image.width.div_ceil(TILE), image.height.div_ceil(TILE));
     let tiles = (0..across * down)
@@ -70,12 +74,13 @@ pub fn trace_image(
             traced
         })
         .collect::<Result<Vec<_>, RenderError>>()?;
-    let mut film = RoundFilm::new(image.width, image.height);
+    let mut film = RoundFilm::new(image.width, image.height, context.plan.layer_names.len());
     let mut counts = EyeCounts::default();
     for tile in tiles {
         counts.add(&tile.counts);
         film.put(tile.x, tile.y, tile.width, &tile.pixels);
         film.lend(&tile.loans);
+        film.put_layers(tile.x, tile.y, tile.width, &tile.layers);
     }
     Ok((film, counts))
 }
@@ -86,18 +91,34 @@ struct Tile {
     width: u32,
     pixels: Vec<PixelSums>,
     loans: Vec<Loan>,
+    layers: Vec<LayerSums>,
     counts: EyeCounts,
+}
+
+/// What photons bring to the pixels that see them directly, and the pictures that hold it.
+type Seen = (Pictures, Irradiance);
+
+/// One for each set of pictures that photons give to there.
+fn seen_directly(context: &EyeContext<'_>, spread: &Spread) -> Vec<Seen> {
+    let gather = |pick: &(dyn Fn(Kind) -> bool + Sync)| {
+        Irradiance::gather(&context.scene.camera, context.footprints, spread, pick)
+    };
+    let Some(language) = &context.plan.language else { return vec![(PICTURE, gather(&|_| true))] };
+    let trail = language.first_diffuse(0);
+    let part = |&pictures: &Pictures| (pictures, gather(&|kind| language.pictures(trail, kind) == pictures));
+    language.parts(trail).iter().map(part).collect()
 }
 
 fn trace_tile(
     context: &EyeContext<'_>,
-    direct: Option<&[Irradiance; 2]>,
+    direct: Option<&[Vec<Seen>; 2]>,
     (x, y): (u32, u32),
 ) -> Result<Tile, RenderError> {
     let image = context.scene.image;
     let (width, height) = (TILE.min(image.width - x), TILE.min(image.height - y));
     let mut walk = EyeWalk::new(context);
     let mut pixels = Vec::with_capacity((width * height) as usize);
+    let mut layers = Vec::new();
     for py in y..y + height {
         for px in x..x + width {
             let index = py as usize * image.width as usize + px as usize;
@@ -106,20 +127,24 @@ fn trace_tile(
                 return Err(RenderError::NotFinite { x: px, y: py, round: context.round, class });
             }
             pixels.push(sums);
+            layers.extend_from_slice(walk.layers.sums());
         }
     }
-    Ok(Tile { x, y, width, pixels, loans: walk.loans, counts: walk.counts })
+    Ok(Tile { x, y, width, pixels, loans: walk.loans, layers, counts: walk.counts })
 }
 
 /// One pixel's samples of this round in both halves. Photons are counted on the pixel's footprint; the eye
 /// samples look up what the footprint does not show, at the end of side branches or where there is no footprint.
 fn trace_pixel(
-    (context, direct): (&EyeContext<'_>, Option<&[Irradiance; 2]>),
+    (context, direct): (&EyeContext<'_>, Option<&[Vec<Seen>; 2]>),
     walk: &mut EyeWalk<'_>,
     (x, y): (u32, u32),
     index: usize,
 ) -> PixelSums {
-    let gathers = context.photons.is_some() && context.plan.caustics == Some(Caustics::Photons);
+    let gathers = context.gathers
+        && context.photons.is_some()
+        && context.plan.caustics == Some(Caustics::Photons)
+        && context.plan.classes.contains(PathClass::Caustic);
     let footprint = context.footprints.get(index);
     let lookups = match footprint {
         _ if !gathers => Lookups::Nowhere,
@@ -132,15 +157,25 @@ fn trace_pixel(
     let count = context.effort.samples(index).max(gathering);
     let mut sums = PixelSums { samples: count, ..PixelSums::default() };
     walk.pixel = index as u32;
+    walk.layers.clear();
     for half in 0..2 {
-        if let (Some(footprint), Some(photons)) = (footprint, context.photons) {
-            sums.halves[half as usize].irradiance = match direct.filter(|_| footprint.direct) {
-                Some(direct) => direct[half as usize].get(index),
-                None => {
-                    walk.counts.lookups += 1;
-                    photons.maps[half as usize].flux_within(footprint) / footprint.area
+        if let (Some(footprint), Some(photons)) = (footprint, context.photons.filter(|_| gathers)) {
+            let bring = &mut |pictures: Pictures, irradiance: Vec3| {
+                if pictures & PICTURE != 0 {
+                    sums.halves[half as usize].irradiance += irradiance;
                 }
+                walk.layers.add(pictures, |layer| layer.irradiance += irradiance);
             };
+            match direct.filter(|_| footprint.direct) {
+                Some(direct) => {
+                    let seen = &direct[half as usize];
+                    seen.iter().for_each(|(pictures, part)| bring(*pictures, part.get(index)));
+                }
+                None => {
+                    on_footprint(context.plan, &photons.maps[half as usize], footprint, bring);
+                    walk.counts.lookups += 1;
+                }
+            }
         }
         let seed = pixel_seed(context.scene.render.seed, x, y, half);
         for i in 0..count {
@@ -159,6 +194,19 @@ fn trace_pixel(
         }
     }
     sums
+}
+
+/// The irradiance that photons bring to a footprint, for each set of pictures that they give to.
+fn on_footprint(plan: &Plan, map: &PhotonMap, footprint: &Footprint, bring: &mut impl FnMut(Pictures, Vec3)) {
+    let Some(language) = &plan.language else {
+        bring(PICTURE, map.flux_within(footprint) / footprint.area);
+        return;
+    };
+    let trail = language.first_diffuse(footprint.specular);
+    for &pictures in language.parts(trail) {
+        let flux = map.flux_of(footprint, |kind| language.pictures(trail, kind) == pictures);
+        bring(pictures, flux / footprint.area);
+    }
 }
 
 fn pixel_seed(seed: u64, x: u32, y: u32, half: u32) -> u64 {

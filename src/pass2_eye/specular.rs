@@ -7,9 +7,10 @@
 
 use super::EyeContext;
 use super::direct::{environment_density, power_heuristic};
+use super::layers::PixelLayers;
 use crate::film::{Loan, PixelSums};
 use crate::geometry::Ray;
-use crate::light_path::PathClass;
+use crate::light_path::{Bounce, PathClass, Trail};
 use crate::media::Media;
 use crate::optics::{Arrival, Event, Interaction, Outcome, transmittance};
 use crate::radius::Reach;
@@ -90,6 +91,8 @@ pub(super) struct EyeWalk<'a> {
     /// When it is followed, and whether it adds light straight from the lights.
     pub(super) time: f32,
     pub(super) direct: bool,
+    /// What the pixel gathers for its named layers.
+    pub(super) layers: PixelLayers,
     pub(super) counts: EyeCounts,
 }
 
@@ -112,6 +115,8 @@ pub(super) struct Branch {
     pub(super) main: bool,
     /// The last D on its way, if there was one.
     pub(super) scattered: Option<Scattered>,
+    /// What it has met, where layers or expressions tell paths apart.
+    pub(super) trail: Trail,
 }
 
 /// A D on the way of a ray from the eye.
@@ -143,6 +148,7 @@ impl<'a> EyeWalk<'a> {
             loans: Vec::new(),
             time: 0.0,
             direct: true,
+            layers: PixelLayers::new(context.plan.layer_names.len()),
             counts: EyeCounts::default(),
         }
     }
@@ -164,8 +170,9 @@ impl<'a> EyeWalk<'a> {
         let Some(time) = photon_time else { return };
         let mut then = PixelSums::default();
         (self.lookups, self.time, self.direct) = (lookups, time, false);
+        self.layers.caustics_only = true;
         self.trace(raster, &mut then);
-        self.direct = true;
+        (self.direct, self.layers.caustics_only) = (true, false);
         let caustic = then.halves[self.half].classes.get(PathClass::Caustic);
         sums.halves[self.half].classes.add(PathClass::Caustic, caustic);
     }
@@ -188,6 +195,7 @@ impl<'a> EyeWalk<'a> {
             key: 1,
             main: true,
             scattered: None,
+            trail: Trail::default(),
         });
         while let Some(branch) = self.stack.pop() {
             self.follow(branch, sums);
@@ -259,7 +267,7 @@ impl<'a> EyeWalk<'a> {
             throughput /= survival;
         }
         let origin = arrival.origin_toward(outcome.direction);
-        self.stack.push(Branch {
+        let mut next = Branch {
             ray: branch.ray.continue_from(origin, outcome.direction),
             throughput,
             media: outcome.media,
@@ -269,7 +277,10 @@ impl<'a> EyeWalk<'a> {
             key: outcome.extend_key(branch.key),
             main,
             scattered: branch.scattered.map(|s| Scattered { straight: false, ..s }),
-        });
+            trail: branch.trail,
+        };
+        self.extend(&mut next, Bounce::Specular);
+        self.stack.push(next);
     }
 
     /// Whether rays that meet a light by chance are what computes the caustics.
@@ -288,17 +299,17 @@ impl<'a> EyeWalk<'a> {
     fn escape(&mut self, branch: &Branch, sums: &mut PixelSums) {
         let (environment, direction) = (&self.context.scene.environment, branch.ray.direction);
         let radiance = branch.throughput * environment.radiance(direction);
-        let classes = &mut sums.halves[self.half].classes;
-        match branch.scattered {
-            None => classes.add(PathClass::Emitted, radiance),
+        let (class, weight) = match branch.scattered {
+            None => (PathClass::Emitted, 1.0),
             Some(Scattered { straight: true, pdf: Some(pdf), count, .. }) => {
                 let weight = power_heuristic(pdf, environment_density(environment, direction));
-                classes.add(PathClass::with_light_after(count), radiance * weight);
+                (PathClass::with_light_after(count), weight)
             }
             Some(Scattered { straight: false, count, .. }) if self.goes_backward() => {
-                classes.add(PathClass::with_caustic_after(count), radiance);
+                (PathClass::with_caustic_after(count), 1.0)
             }
-            Some(_) => {}
-        }
+            Some(_) => return,
+        };
+        self.add(class, self.pictures_of_environment(branch, class), radiance * weight, sums);
     }
 }

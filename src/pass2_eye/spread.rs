@@ -7,6 +7,7 @@
 use super::footprint::{Footprint, Footprints};
 use super::outline::Coverage;
 use crate::geometry::SheetId;
+use crate::light_path::Kind;
 use crate::pass1_light::{LightImage, Spread};
 use crate::photon_map::Photon;
 use crate::sampling::hash;
@@ -58,17 +59,23 @@ impl Irradiance {
     /// Bytes per pixel of both halves.
     pub const BYTES_PER_PIXEL: u64 = 2 * size_of::<Vec3>() as u64;
 
-    /// Spreads the light of one half over the pixels.
+    /// Spreads the light of one half, of the kinds that are picked, over the pixels.
     #[must_use]
-    pub fn gather(camera: &Camera, footprints: &Footprints, spread: &Spread) -> Self {
+    pub fn gather(
+        camera: &Camera,
+        footprints: &Footprints,
+        spread: &Spread,
+        pick: impl Fn(Kind) -> bool,
+    ) -> Self {
         let (count, width) = footprints.size();
         if !footprints.any_direct() {
             return Self::default();
         }
         let mut patches = Vec::with_capacity(spread.images.len() + spread.points.len());
         let on_screen = Screen { camera, size: Vec2::new(width as f32, (count / width) as f32) };
-        spread.images.iter().for_each(|image| on_screen.place_image(image, &mut patches));
-        for photon in &spread.points {
+        let images = spread.images.iter().filter(|image| pick(image.kind));
+        images.for_each(|image| on_screen.place_image(image, &mut patches));
+        for photon in spread.points.iter().filter(|photon| pick(photon.kind)) {
             on_screen.place(Light::from(photon), &mut patches);
         }
         let mut pixels = vec![Vec3::ZERO; count];

@@ -1,7 +1,7 @@
 //! The density estimates of the classic photon map, for comparison: a fixed disc, and the nearest photons. Neither knows
 //! of the surface's border.
 
-use super::{Lookup, PhotonMap, Stored, decode_direction};
+use super::{Incoming, Lookup, PhotonMap, Stored};
 use glam::Vec3;
 use std::cmp::Ordering;
 use std::f32::consts::PI;
@@ -27,7 +27,7 @@ pub struct Found {
 impl PhotonMap {
     /// Density estimate with the constant kernel 1/(πr²); otherwise as [`PhotonMap::radiance`].
     #[must_use]
-    pub fn disc_radiance(&self, lookup: &Lookup, per_irradiance: impl Fn(Vec3) -> Vec3) -> Vec3 {
+    pub fn disc_radiance(&self, lookup: &Lookup, per_irradiance: impl Fn(Incoming) -> Vec3) -> Vec3 {
         let mut sum = Vec3::ZERO;
         self.visit(lookup, lookup.radius, |_, photon| sum += photon.seen(&per_irradiance));
         per_disc(sum, lookup.radius * lookup.radius)
@@ -42,7 +42,7 @@ impl PhotonMap {
         &self,
         lookup: &Lookup,
         nearest: Nearest,
-        per_irradiance: impl Fn(Vec3) -> Vec3,
+        per_irradiance: impl Fn(Incoming) -> Vec3,
     ) -> Found {
         let Nearest { count, least } = nearest;
         let mut photons: Vec<(f32, Stored)> = Vec::with_capacity(2 * count.min(4096));
@@ -71,14 +71,14 @@ impl PhotonMap {
 
 impl Stored {
     /// What the viewer sees of it, times area.
-    fn seen(&self, per_irradiance: &impl Fn(Vec3) -> Vec3) -> Vec3 {
-        Vec3::from_array(self.power) * per_irradiance(-decode_direction(self.direction))
+    fn seen(&self, per_irradiance: &impl Fn(Incoming) -> Vec3) -> Vec3 {
+        Vec3::from_array(self.power) * per_irradiance(self.incoming())
     }
 }
 
 /// By distance, then by what the photons carry.
 fn order(a: &(f32, Stored), b: &(f32, Stored)) -> Ordering {
-    let rest = |p: &Stored| (p.power.map(f32::to_bits), p.sheet, p.direction, p.normal);
+    let rest = |p: &Stored| (p.power.map(f32::to_bits), p.place, p.direction, p.normal);
     a.0.total_cmp(&b.0).then_with(|| rest(&a.1).cmp(&rest(&b.1)))
 }
 

@@ -1,9 +1,10 @@
 //! Pass 1 of one round: photons as maps to gather from, or connected to the eye.
 
 use super::{Control, Render, RenderError};
+use crate::light_path::PathClass;
 use crate::pass1_light::{self, Blocks, RoundPhotons, Tally};
 use crate::pass2_eye::{self, Connected};
-use crate::scene::{Caustics, Paths};
+use crate::scene::Caustics;
 
 /// What pass 1 gives to pass 2.
 #[derive(Default)]
@@ -28,7 +29,7 @@ impl Render {
             Some(Caustics::Forward) => {
                 let connected = pass2_eye::connect(&self.scene, &self.plan, &lists, self.rounds(), control)?;
                 // Light that goes on from the first D is gathered all the same.
-                (Some(connected), self.scene.render.paths == Paths::Complete)
+                (Some(connected), self.plan.classes.contains(PathClass::Indirect))
             }
             Some(Caustics::Photons | Caustics::Backward) | None => (None, true),
         };

@@ -1,7 +1,9 @@
 //! The environment of the scene file: exactly what the JSON says, nothing computed.
 
 use super::json::{Node, Value};
-use super::read::{Context, Decode, MAX_LENGTH, any_is, color, name, object, or, real, record, required};
+use super::read::{
+    Context, Decode, MAX_LENGTH, any_is, color, name, object, optional, or, real, record, required,
+};
 use super::schema::Definitions;
 use serde_json::json;
 
@@ -24,6 +26,8 @@ record! {
         scale: f64 = or(real("factor on the radiance").between(0.0, MAX_LENGTH), 1.0),
         /// By how much the picture is turned about the y axis, anticlockwise seen from above.
         rotate: f64 = or(real("angle in degrees").between(-3600.0, 3600.0).unit("°"), 0.0),
+        /// Its light group, as of a light.
+        group: Option<String> = optional(name()),
     }
 }
 
@@ -32,6 +36,18 @@ record! {
     ConstantEnvironmentFile {
         /// Radiance.
         radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
+        /// Its light group, as of a light.
+        group: Option<String> = optional(name()),
+    }
+}
+
+impl EnvironmentFile {
+    /// Its light group.
+    pub(super) fn group(&self) -> Option<&str> {
+        match self {
+            Self::Constant(ConstantEnvironmentFile { group, .. })
+            | Self::Image(ImageEnvironmentFile { group, .. }) => group.as_deref(),
+        }
     }
 }
 

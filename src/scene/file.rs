@@ -7,7 +7,9 @@ use super::issue::{IssueCode, Issues};
 use super::json::{Node, Value};
 use super::light_file::LightFile;
 use super::material_file::MaterialFile;
+use super::paths_file::{LightPath, LightPaths};
 use super::radius_file::Radius;
+use super::read::name as group_name;
 use super::read::{
     Context, Decode, Fields, MAX_LENGTH, choice, color, count, direction, name, named, note_duplicates,
     object, optional, or, pair, part, point, real, record, reference, required, seed, slots, tagged,
@@ -16,6 +18,7 @@ use super::schema::Definitions;
 use super::shape_file::{MotionFile, ShapeFile};
 use super::{Aiming, Caustics, LightSampling, Paths, Tone};
 use crate::geometry::Structure;
+use crate::light_path::Expression;
 use crate::radius::RadiusRule;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -142,6 +145,8 @@ record! {
         /// Radiance of its front: the outside of a sphere, the side of a polygon or mesh from which
         /// its vertices run anticlockwise. Makes the object a light; it still reflects by its material.
         emission: Option<[f64; 3]> = optional(color("emission").unit("W·sr⁻¹·m⁻²")),
+        /// The light group of its emission, as of a light.
+        group: Option<String> = optional(group_name()),
         /// Its velocity in m/s: it moves on a straight line while the camera's `shutter` is open.
         velocity: [f64; 3] = or(point(), [0.0; 3]),
         /// How it moves while the camera's `shutter` is open, besides by its `velocity`.
@@ -155,8 +160,13 @@ record! {
 record! {
     /// What is asked of the renderer.
     RenderFile {
-        /// Which light paths are computed: `whitted` is LS*E and LDS*E, `caustics` also LS+DS*E.
-        paths: Paths = or(choice(Paths::NAMED.to_vec()), Paths::Caustics),
+        /// Which light paths are computed: `whitted` is LS*E|LDS*E, `caustics` LS*E|LDS*E|LS+DS*E and `complete` L(D|S)*E; or
+        /// any expression over L (the light), D (a diffuse or rough surface), S (a mirror or smooth glass) and E (the eye) with
+        /// ( ) | * + ? {m,n}, where `.` is (D|S). What it does not hold is not computed.
+        paths: Paths = or(LightPaths, Paths::Caustics),
+        /// Layers besides those of the classes, by name: the light of those of the picture's paths that are in an expression, as
+        /// in `{"glints": "LS+E"}`. They cost no rays, and add up to the picture if each of its paths is in just one.
+        layers: Vec<(String, Option<Expression>)> = or(named(LightPath), Vec::new()),
         /// What computes the caustics LS+DS*E: photons, or for comparison `backward`, path tracing that meets the lights by
         /// chance, or `forward`, photons connected to the eye, which leaves out what mirrors and glass show.
         caustics: Caustics = or(choice(Caustics::NAMED.to_vec()), Caustics::Photons),
@@ -184,6 +194,7 @@ impl Default for RenderFile {
     fn default() -> Self {
         Self {
             paths: Paths::default(),
+            layers: Vec::new(),
             caustics: Caustics::default(),
             stop: None,
             radius: RadiusRule::default(),

@@ -1,6 +1,6 @@
 //! The lights of the scene file: exactly what the JSON says, nothing computed.
 
-use super::read::{color, direction, optional, point, real, record, required, size2, tagged};
+use super::read::{color, direction, name, optional, point, real, record, required, size2, tagged};
 
 tagged! {
     /// A light.
@@ -21,6 +21,9 @@ record! {
         position: [f64; 3] = required(point()),
         /// Radiant intensity.
         intensity: [f64; 3] = required(color("intensity").unit("W·sr⁻¹")),
+        /// Its light group: the light of all lights of a group is a layer of this name, at no cost in rays. The light of all
+        /// that is in no group is the layer `ungrouped`.
+        group: Option<String> = optional(name()),
     }
 }
 
@@ -40,6 +43,9 @@ record! {
         outer: f64 = required(real("opening angle in degrees").above(0.0).at_most(180.0).unit("°")),
         /// Opening angle of the cone within which the light is full, in degrees; 0.8 of `outer` if left out.
         inner: Option<f64> = optional(real("opening angle in degrees").between(0.0, 180.0).unit("°")),
+        /// Its light group: the light of all lights of a group is a layer of this name, at no cost in rays. The light of all
+        /// that is in no group is the layer `ungrouped`.
+        group: Option<String> = optional(name()),
     }
 }
 
@@ -50,6 +56,9 @@ record! {
         direction: [f64; 3] = required(direction()),
         /// Irradiance on a surface that faces the light.
         irradiance: [f64; 3] = required(color("irradiance").unit("W·m⁻²")),
+        /// Its light group: the light of all lights of a group is a layer of this name, at no cost in rays. The light of all
+        /// that is in no group is the layer `ungrouped`.
+        group: Option<String> = optional(name()),
     }
 }
 
@@ -66,6 +75,9 @@ record! {
         edge: Option<[f64; 3]> = optional(direction()),
         /// Radiance.
         radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
+        /// Its light group: the light of all lights of a group is a layer of this name, at no cost in rays. The light of all
+        /// that is in no group is the layer `ungrouped`.
+        group: Option<String> = optional(name()),
     }
 }
 
@@ -80,6 +92,9 @@ record! {
         towards: [f64; 3] = required(point()),
         /// Radiance.
         radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
+        /// Its light group: the light of all lights of a group is a layer of this name, at no cost in rays. The light of all
+        /// that is in no group is the layer `ungrouped`.
+        group: Option<String> = optional(name()),
     }
 }
 
@@ -92,5 +107,22 @@ record! {
         radius: f64 = required(real("radius in metres").positive_length()),
         /// Radiance.
         radiance: [f64; 3] = required(color("radiance").unit("W·sr⁻¹·m⁻²")),
+        /// Its light group: the light of all lights of a group is a layer of this name, at no cost in rays. The light of all
+        /// that is in no group is the layer `ungrouped`.
+        group: Option<String> = optional(name()),
+    }
+}
+
+impl LightFile {
+    /// Its light group.
+    pub(super) fn group(&self) -> Option<&str> {
+        match self {
+            Self::Point(PointLightFile { group, .. })
+            | Self::Spot(SpotLightFile { group, .. })
+            | Self::Directional(DirectionalLightFile { group, .. })
+            | Self::Quad(QuadLightFile { group, .. })
+            | Self::Disk(DiskLightFile { group, .. })
+            | Self::Sphere(SphereLightFile { group, .. }) => group.as_deref(),
+        }
     }
 }

@@ -240,6 +240,16 @@ impl Material {
         }
     }
 
+    /// Whether the eye sees it without any light.
+    #[must_use]
+    pub fn glows(&self) -> bool {
+        match self {
+            Self::Diffuse { .. } | Self::Mirror { .. } | Self::Metal { .. } | Self::Glass { .. } => false,
+            Self::Phong(phong) => phong.emission + phong.ambient != Vec3::ZERO,
+            Self::Mix(mix) => mix.parts.iter().any(Self::glows),
+        }
+    }
+
     /// What the eye sees of it without any light: emission and ambient light of the Phong model.
     #[must_use]
     pub fn glow(&self, uv: Vec2) -> Vec3 {

@@ -17,6 +17,7 @@ mod light_file;
 mod material;
 mod material_file;
 mod mesh_file;
+mod paths_file;
 mod radius_file;
 mod read;
 mod schema;
@@ -26,6 +27,7 @@ pub(crate) mod texture;
 pub use assets::{AssetError, AssetSource, DirectoryAssets, MemoryAssets, NoAssets};
 pub use camera::{Camera, Lens, Projection, View};
 pub use check::Warning;
+pub(crate) use compile::UNGROUPED;
 pub use environment::{Environment, EnvironmentImage, EnvironmentSample};
 pub use issue::{IssueCode, SceneErrors, SceneIssue};
 pub use light::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight, SpotLight};
@@ -33,8 +35,10 @@ pub use material::{Alpha, Conductor, Dielectric, FRAUNHOFER, Highlight, Ior, Mat
 pub use schema::{schema, schema_markdown};
 pub use texture::{Texture, TextureImage};
 
+pub use crate::light_path::Paths;
+
 use crate::geometry::{Geometry, Structure};
-use crate::light_path::PathClass;
+use crate::light_path::Expression;
 use crate::radius::RadiusRule;
 use glam::Vec2;
 
@@ -86,6 +90,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// What surrounds it all.
     pub environment: Environment,
+    /// Which lights are layers of their own.
+    pub light_groups: LightGroups,
     /// Bytes of the pictures that textures and environment are made of.
     pub image_bytes: u64,
     /// What the file asks of the renderer.
@@ -137,50 +143,6 @@ pub enum Tone {
     Linear,
     /// The ACES-like filmic fit of Narkowicz (2015): rolls highlights off.
     Filmic,
-}
-
-/// Which light paths are computed: the choice of method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Paths {
-    /// `LS*E|LDS*E`: the recursive ray tracing of Whitted (1980), without caustics.
-    Whitted,
-    /// `LS*E|LDS*E|LS+DS*E`: the two passes.
-    #[default]
-    Caustics,
-    /// `L(D|S)*E`: everything, with the light that bounces between D's.
-    Complete,
-}
-
-impl Paths {
-    /// Every value and its name.
-    pub const NAMED: [(&str, Self); 3] =
-        [("whitted", Self::Whitted), ("caustics", Self::Caustics), ("complete", Self::Complete)];
-
-    /// The classes of paths that are asked for.
-    #[must_use]
-    pub fn classes(self) -> &'static [PathClass] {
-        match self {
-            Self::Whitted => &[PathClass::Emitted, PathClass::Direct],
-            Self::Caustics => &[PathClass::Emitted, PathClass::Direct, PathClass::Caustic],
-            Self::Complete => &PathClass::ALL,
-        }
-    }
-}
-
-/// A value of `paths` that does not exist.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "`{0}` is not one of `whitted` (LS*E|LDS*E), `caustics` (LS*E|LDS*E|LS+DS*E) and `complete` (L(D|S)*E)"
-)]
-pub struct UnknownPaths(String);
-
-impl std::str::FromStr for Paths {
-    type Err = UnknownPaths;
-
-    fn from_str(text: &str) -> Result<Self, UnknownPaths> {
-        let known = Self::NAMED.iter().find(|(name, _)| *name == text);
-        known.map(|(_, paths)| *paths).ok_or_else(|| UnknownPaths(text.to_owned()))
-    }
 }
 
 /// Which estimator computes the caustics, `LS+DS*E`. They agree where all can converge; the others are for comparison.
@@ -256,11 +218,33 @@ impl LightSampling {
     ];
 }
 
+/// A layer of the picture: the light of some of its paths.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NamedLayer {
+    /// Its name, in file names too.
+    pub name: String,
+    /// Its paths, as far as the picture has them.
+    pub paths: Expression,
+}
+
+/// Lights whose light is a layer of its own.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LightGroups {
+    /// Name of each group.
+    pub names: Vec<String>,
+    /// The group of each light.
+    pub of_light: Vec<Option<usize>>,
+    /// The group of the environment.
+    pub of_environment: Option<usize>,
+}
+
 /// What the scene file asks of the renderer.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RenderSettings {
     /// Which light paths are computed.
     pub paths: Paths,
+    /// Layers besides those of the classes.
+    pub layers: Vec<NamedLayer>,
     /// Which estimator computes the caustics.
     pub caustics: Caustics,
     /// When the render ends; the first limit reached ends it.

@@ -55,6 +55,8 @@ pub(super) struct Choice {
     pub(super) irradiance: Vec3,
     /// Estimated squared error of it, mean over channels.
     pub(super) squared_error: f32,
+    /// The width, as a number of the ladder.
+    pub(super) level: u8,
 }
 
 /// One width: both halves filtered.
@@ -100,6 +102,31 @@ impl Ladder {
 
     pub(super) fn choice(&self, local: usize) -> Choice {
         self.choices[local]
+    }
+}
+
+/// A part of the irradiance over a segment, at widths that were chosen before: filters are linear, so that parts add up to
+/// the whole. `value` and `level` are by pixel of the picture; tells the result of each.
+pub(super) fn filter_part(
+    segment: &Segment,
+    value: &[Vec3],
+    level: &[u8],
+    mut tell: impl FnMut(usize, Vec3),
+) {
+    let area = segment.size.0 * segment.size.1;
+    let (mut mask, mut raw) = (vec![0.0_f32; area], vec![Vec3::ZERO; area]);
+    for &pixel in &segment.pixels {
+        let local = segment.local(pixel);
+        (mask[local], raw[local]) = (1.0, value[pixel as usize]);
+    }
+    for (number, width) in LEVELS.iter().enumerate() {
+        let chosen = || segment.pixels.iter().filter(|&&pixel| usize::from(level[pixel as usize]) == number);
+        if chosen().next().is_none() {
+            continue;
+        }
+        let share = shares(*width, &mask, segment.size);
+        let filtered = filter_plane(*width, raw.clone(), (&share, &mask), segment.size);
+        chosen().for_each(|&pixel| tell(pixel as usize, filtered[segment.local(pixel)]));
     }
 }
 
@@ -156,7 +183,7 @@ fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -
                 for i in block.filter(|&i| weights[i] > 0.0) {
                     let irradiance = 0.5 * (halves[0][i] + halves[1][i]);
                     choices[i - rows.start * width] =
-                        Choice { irradiance, squared_error: relative / weights[i] };
+                        Choice { irradiance, squared_error: relative / weights[i], level: level as u8 };
                 }
             }
             choices
@@ -194,16 +221,28 @@ fn filter(level: Level, raw: &[Vec<Vec3>; 2], mask: &[f32], size: (usize, usize)
     if level.boxes.is_empty() {
         return Filtered { halves: raw.clone() };
     }
+    let share = shares(level, mask, size);
+    Filtered { halves: raw.clone().map(|plane| filter_plane(level, plane, (&share, mask), size)) }
+}
+
+/// The filtered mask.
+fn shares(level: Level, mask: &[f32], size: (usize, usize)) -> Vec<Vec3> {
     let mut share: Vec<Vec3> = mask.iter().map(|&m| Vec3::splat(m)).collect();
     level.boxes.iter().for_each(|&b| box_filter(&mut share, b, size));
-    let halves = raw.clone().map(|mut plane| {
-        level.boxes.iter().for_each(|&b| box_filter(&mut plane, b, size));
-        for ((value, share), inside) in plane.iter_mut().zip(&share).zip(mask) {
-            *value = if *inside > 0.0 { *value / share.x } else { Vec3::ZERO };
-        }
-        plane
-    });
-    Filtered { halves }
+    share
+}
+
+fn filter_plane(
+    level: Level,
+    mut plane: Vec<Vec3>,
+    (share, mask): (&[Vec3], &[f32]),
+    size: (usize, usize),
+) -> Vec<Vec3> {
+    level.boxes.iter().for_each(|&b| box_filter(&mut plane, b, size));
+    for ((value, share), inside) in plane.iter_mut().zip(share).zip(mask) {
+        *value = if *inside > 0.0 { *value / share.x } else { Vec3::ZERO };
+    }
+    plane
 }
 
 /// Running sums over 2 `half` + 1 pixels across, then down (not divided by their number).

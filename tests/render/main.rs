@@ -24,6 +24,7 @@ mod lights;
 mod materials;
 mod motion;
 mod optics;
+mod paths;
 mod photon_map;
 mod picture;
 mod plan;

@@ -8,7 +8,7 @@ use nephroid::sampling::{SamplePoint, hash};
 use serde_json::json;
 
 fn photon(position: Vec3) -> Photon {
-    Photon { position, direction: Vec3::NEG_Y, normal: Vec3::Y, sheet: SheetId(0), power: Vec3::ONE }
+    Photon { position, direction: Vec3::NEG_Y, normal: Vec3::Y, sheet: SheetId(0), kind: 0, power: Vec3::ONE }
 }
 
 fn lookup(point: Vec3, radius: f32) -> Lookup {

@@ -72,7 +72,7 @@ fn footprints_count_every_photon_once() {
             let u = SamplePoint::new(6, i).get_2d(0) * 2.0 - 1.0;
             let position = Vec3::new(0.5 + half * u.x, 0.0, half * u.y);
             let direction = Vec3::new(-0.6, -0.8, 0.0);
-            Photon { position, direction, normal: Vec3::Y, sheet, power: Vec3::ONE }
+            Photon { position, direction, normal: Vec3::Y, sheet, kind: 0, power: Vec3::ONE }
         })
         .collect();
     let map = PhotonMap::build(&photons);

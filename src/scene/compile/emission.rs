@@ -11,7 +11,13 @@ use glam::{DAffine3, DVec2, DVec3, Vec3};
 impl Compiler<'_> {
     /// Makes an object a light if it has an emission. Its shape has been added before.
     pub(super) fn emission(&mut self, id: ObjectId, object: &ObjectFile, index: usize) {
-        let Some(radiance) = object.emission.map(vec3) else { return };
+        let Some(radiance) = object.emission.map(vec3) else {
+            if object.group.is_some() {
+                let message = "an object without `emission` is no light: it has no light group";
+                self.issues.add(format!("/objects/{index}/group"), IssueCode::ConflictingFields, message);
+            }
+            return;
+        };
         let material = self.objects[id.index()].material;
         let specular = self.materials.get(material.index()).is_some_and(Material::has_specular);
         if specular {
@@ -27,6 +33,8 @@ impl Compiler<'_> {
         self.objects[id.index()].emitter = Some(LightId(self.lights.len() as u32));
         self.light_places.push(format!("/objects/{index}/emission"));
         self.lights.push(light);
+        let group = self.light_group(object.group.as_deref(), &format!("/objects/{index}"));
+        self.light_groups.of_light.push(group);
     }
 
     /// The light of a shape; `None` if the shape is wrong, which has then been noted.

@@ -17,12 +17,15 @@ const MIN_CONE: f64 = 0.1;
 impl Compiler<'_> {
     pub(super) fn lights(&mut self, lights: &[Option<LightFile>]) {
         for (index, light) in lights.iter().enumerate() {
-            let Some(light) = light.as_ref().and_then(|light| self.light(light, index)) else { continue };
+            let Some(file) = light.as_ref() else { continue };
+            let Some(light) = self.light(file, index) else { continue };
             if light.surface_radiance().is_some() {
                 self.light_surface(&light, index);
             }
             self.light_places.push(format!("/lights/{index}"));
             self.lights.push(light);
+            let group = self.light_group(file.group(), &format!("/lights/{index}"));
+            self.light_groups.of_light.push(group);
         }
     }
 
@@ -32,7 +35,7 @@ impl Compiler<'_> {
                 Light::Point { position: vec3(point.position), intensity: vec3(point.intensity) }
             }
             LightFile::Spot(spot) => Light::Spot(self.spot_light(spot, index)?),
-            LightFile::Directional(DirectionalLightFile { direction, irradiance }) => {
+            LightFile::Directional(DirectionalLightFile { direction, irradiance, .. }) => {
                 let direction = DVec3::from(*direction).normalize().as_vec3();
                 Light::Directional { direction, irradiance: vec3(*irradiance) }
             }

@@ -5,6 +5,7 @@ mod camera;
 mod checks;
 mod emission;
 mod environment;
+mod layers;
 mod light;
 mod material;
 mod mesh;
@@ -14,6 +15,8 @@ mod shape;
 mod texture;
 mod touching;
 
+pub(crate) use layers::UNGROUPED;
+
 use super::assets::AssetSource;
 use super::file::{ImageFile, ObjectFile, RenderFile, SceneFile, StopFile, read_scene_file};
 use super::issue::{IssueCode, Issues, SceneErrors};
@@ -21,7 +24,8 @@ use super::json::{ParseError, ParseErrorKind, parse};
 use super::material_file::MaterialFile;
 use super::shape_file::ShapeFile;
 use super::{
-    ImageSettings, Light, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop, Tone, Warning,
+    ImageSettings, Light, LightGroups, Material, MaterialId, Object, ObjectId, RenderSettings, Scene, Stop,
+    Tone, Warning,
 };
 use crate::geometry::GeometryBuilder;
 use crate::media::MOST_MATERIALS;
@@ -77,6 +81,7 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         shutter: [0.0; 2],
         warnings: Vec::new(),
         light_places: Vec::new(),
+        light_groups: LightGroups::default(),
     };
     let image = image_settings(file.image.as_ref().and_then(Option::as_ref));
     let camera = file.camera.as_ref().and_then(|camera| {
@@ -87,7 +92,10 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
     compiler.objects(file.objects.as_deref().unwrap_or_default());
     compiler.lights(file.lights.as_deref().unwrap_or_default());
     let render = file.render.as_ref().and_then(|render| compiler.render(render));
-    let environment = compiler.environment(file.environment.as_ref().and_then(Option::as_ref));
+    let surroundings = file.environment.as_ref().and_then(Option::as_ref);
+    let environment = compiler.environment(surroundings);
+    let group = surroundings.and_then(|file| file.group());
+    compiler.light_groups.of_environment = compiler.light_group(group, "/environment");
     if compiler.issues.count() > 0 {
         return None;
     }
@@ -102,12 +110,14 @@ fn compile(file: &SceneFile, assets: &dyn AssetSource, issues: &mut Issues) -> O
         lights: take(&mut compiler.lights),
         image_bytes: compiler.textures.memory_bytes() + environment.memory_bytes(),
         environment,
+        light_groups: take(&mut compiler.light_groups),
         render: render?,
         touching: Vec::new(),
         warnings: Vec::new(),
     };
     scene.touching = compiler.touching(file.objects.as_deref().unwrap_or_default(), &scene);
     scene.warnings = compiler.checks(file.objects.as_deref().unwrap_or_default(), &scene);
+    compiler.check_layers(&scene)?;
     Some(scene)
 }
 
@@ -132,6 +142,7 @@ struct Compiler<'f> {
     warnings: Vec<Warning>,
     /// Where in the file each light is, as a JSON pointer.
     light_places: Vec<String>,
+    light_groups: LightGroups,
 }
 
 impl<'f> Compiler<'f> {
@@ -233,19 +244,12 @@ impl<'f> Compiler<'f> {
                 Stop { error: error.map(|e| e as f32), seconds: *seconds, rounds: *rounds }
             }
         };
-        let RenderFile {
-            paths,
-            caustics,
-            radius,
-            aiming,
-            structure,
-            light_sampling,
-            light_grid,
-            seed,
-            stop: _,
-        } = *render;
+        let RenderFile { caustics, radius, aiming, structure, light_sampling, light_grid, seed, .. } =
+            *render;
+        let (paths, layers) = (render.paths.clone(), self.layers(&render.layers)?);
         Some(RenderSettings {
             paths,
+            layers,
             caustics,
             stop,
             radius,

@@ -1,0 +1,82 @@
+//! The named layers of a film: parts of the picture that are summed beside it.
+
+use super::{Film, PixelSums, RoundFilm};
+use crate::image_io::LinearImage;
+use glam::{DVec3, Vec3};
+
+/// What both halves of a pixel have gathered for one named layer; sums as in [`HalfSums`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LayerSums {
+    /// Radiance that eye samples bring.
+    pub sampled: Vec3,
+    /// Radiance by photons that were looked up point by point.
+    pub looked_up: Vec3,
+    /// Irradiance that photons bring to the pixel's footprint.
+    pub irradiance: Vec3,
+}
+
+impl LayerSums {
+    /// Bytes of one.
+    pub const BYTES: u64 = size_of::<Self>() as u64;
+
+    pub(super) fn to_array(self) -> [f32; 9] {
+        let parts = [self.sampled, self.looked_up, self.irradiance].map(|part| part.to_array());
+        std::array::from_fn(|i| parts[i / 3][i % 3])
+    }
+
+    pub(super) fn from_array(values: [f32; 9]) -> Self {
+        let part = |i: usize| Vec3::from_slice(&values[3 * i..]);
+        Self { sampled: part(0), looked_up: part(1), irradiance: part(2) }
+    }
+
+    /// Adds those of a round, whose photons count `photon_weight` times those of the first.
+    pub(super) fn add(&mut self, round: &Self, photon_weight: f32) {
+        self.sampled += round.sampled;
+        self.looked_up += round.looked_up * photon_weight;
+        self.irradiance += round.irradiance * photon_weight;
+    }
+}
+
+impl RoundFilm {
+    /// Puts a tile's layers, as [`RoundFilm::put`] its pixels.
+    pub(crate) fn put_layers(&mut self, x: u32, y: u32, tile_width: u32, layers: &[LayerSums]) {
+        let each = self.layers.len() / self.pixels.len();
+        for (row, values) in layers.chunks_exact((tile_width as usize * each).max(1)).enumerate() {
+            let start = ((y as usize + row) * self.width as usize + x as usize) * each;
+            self.layers[start..start + values.len()].copy_from_slice(values);
+        }
+    }
+
+    /// Adds what photons connected to the eye bring to a layer, in either half; row by row.
+    pub(crate) fn add_to_layer(&mut self, layer: usize, radiance: &[DVec3]) {
+        let each = self.layers.len() / self.pixels.len();
+        for (sums, radiance) in self.layers.chunks_exact_mut(each).zip(radiance) {
+            sums[layer].looked_up += radiance.as_vec3();
+        }
+    }
+}
+
+impl Film {
+    /// A named layer, as it was gathered.
+    #[must_use]
+    pub fn named_layer(&self, index: usize) -> LinearImage {
+        let each = self.layers.len() / self.pixels.len().max(1);
+        let per_photon = if self.photon_weight > 0.0 { 0.5 / self.photon_weight } else { 0.0 };
+        let value = |(sums, pixel): (&[LayerSums], &PixelSums)| {
+            let LayerSums { sampled, looked_up, irradiance } = sums[index];
+            let per_sample = 0.5 / pixel.samples.max(1) as f32;
+            let photons = pixel.gain * per_sample * irradiance + looked_up;
+            (sampled * per_sample + photons * per_photon).to_array()
+        };
+        let pixels = self.layers.chunks_exact(each).zip(&self.pixels).map(value).collect();
+        LinearImage { width: self.width, height: self.height, pixels }
+    }
+
+    /// The part of a named layer in the irradiance of the pixels' footprints, mean of the halves.
+    #[must_use]
+    pub fn layer_irradiance(&self, index: usize) -> Vec<Vec3> {
+        let each = self.layers.len() / self.pixels.len().max(1);
+        let per_photon = if self.photon_weight > 0.0 { 0.5 / self.photon_weight } else { 0.0 };
+        self.layers.chunks_exact(each).map(|sums| sums[index].irradiance * per_photon).collect()
+    }
+}

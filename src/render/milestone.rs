@@ -1,0 +1,86 @@
+//! Where a round looks at what it found: the error, and the effort that follows from it.
+
+use super::Render;
+use super::RenderError;
+use super::control::Control;
+use crate::effort::{Effort, Measured};
+use crate::film::Film;
+use crate::pass1_light::RoundPhotons;
+use crate::pass2_eye::{self, EyeContext, EyeCounts};
+use crate::picture::{Picture, PixelError};
+use crate::sampling::hash;
+
+/// True for 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, …: at these numbers of rounds the error is estimated and the
+/// render may stop by it. Between them the picture gains too little to be worth the estimate.
+pub(super) fn is_milestone(rounds: u32) -> bool {
+    rounds.is_power_of_two() || (rounds.is_multiple_of(3) && (rounds / 3).is_power_of_two())
+}
+
+impl Render {
+    /// Adds eye samples to the first round where its own find that they are missing: at borders and in half shadows. A
+    /// whole round more, photons and all, would cost more.
+    pub(super) fn look_again(
+        &self,
+        mut film: Film,
+        photons: Option<&RoundPhotons>,
+        eye: &mut EyeCounts,
+        control: &Control,
+    ) -> Result<Film, RenderError> {
+        let errors = Picture::with_smoothing(&film, &self.footprints, None).errors();
+        let samples: Vec<u32> = film.pixels().iter().map(|p| p.samples).collect();
+        let measured = self.measured(&film, (&errors, &samples), eye);
+        let effort = Effort::second_look(&measured, hash(self.scene.render.seed, u64::MAX));
+        let context = EyeContext {
+            scene: &self.scene,
+            plan: &self.plan,
+            photons,
+            gathers: false,
+            round: 0,
+            footprints: &self.footprints,
+            film: &film,
+            effort: &effort,
+        };
+        let (more, counts) = pass2_eye::trace_image(&context, control)?;
+        film.add_samples(more);
+        eye.add(&counts);
+        Ok(film)
+    }
+
+    /// What decides on the effort.
+    fn measured<'a>(
+        &self,
+        film: &Film,
+        (errors, samples): (&'a [PixelError], &'a [u32]),
+        eye: &EyeCounts,
+    ) -> Measured<'a> {
+        let sampled: u64 = samples.iter().map(|&n| 2 * u64::from(n)).sum();
+        let photon_rays: u64 = self.windows.iter().map(|t| t.rays).sum();
+        let weight = film.photon_weight();
+        Measured {
+            errors,
+            width: film.size().0,
+            samples,
+            photon_weight: weight,
+            rays_per_block: if weight > 0.0 { photon_rays as f32 / weight } else { 0.0 },
+            rays_per_sample: (eye.eye_rays + eye.shadow_rays) as f32 / sampled.max(1) as f32,
+        }
+    }
+
+    /// Estimates the error where the number of rounds is a milestone, and decides what the next rounds do.
+    pub(super) fn at_milestone(&mut self) {
+        if !is_milestone(self.rounds()) {
+            return;
+        }
+        let picture = Picture::new(&self.film, &self.footprints);
+        let errors = picture.errors();
+        let samples: Vec<u32> = self.film.pixels().iter().map(|p| p.samples).collect();
+        let measured = self.measured(&self.film, (&errors, &samples), &self.eye);
+        let key = hash(self.scene.render.seed, u64::from(self.rounds()));
+        // A round at most doubles what was done before: no single one overruns a limit of time by far.
+        let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);
+        self.effort = Effort::decide(&measured, most_shift, key);
+        self.error = Some(PixelError::root_mean(&errors));
+        self.preview = picture.image();
+        self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));
+    }
+}
