@@ -32,7 +32,13 @@ for tool in buildah debootstrap; do
 done
 # Plain copies and chroot need no privileges beyond root's, so that this works inside a container, too.
 export STORAGE_DRIVER=vfs BUILDAH_ISOLATION=chroot
-trap '[ -z "${server:-}" ] || kill "$server" 2> /dev/null || true
+# buildah does not pass a signal on: the service is the last of its descendants.
+stop() {
+  local last=$server child
+  while child=$(pgrep -P "$last" | head -1) && [ -n "$child" ]; do last=$child; done
+  kill "$last" && wait "$server" || true
+}
+trap '[ -z "${server:-}" ] || stop
       [ -z "${container:-}" ] || buildah rm "$container" > /dev/null 2>&1 || true
       rm -rf "$work"' EXIT
 
@@ -54,10 +60,14 @@ cargo_home=${CARGO_HOME:-$HOME/.cargo}
 rustup_home=${RUSTUP_HOME:-$HOME/.rustup}
 cargo fetch --locked
 mkdir -p target/image
-buildah bud --build-arg BUILD_IMAGE=localhost/nephroid-build --build-arg BASE_IMAGE=localhost/nephroid-base \
+toolchain=$(buildah from localhost/nephroid-build)
+for pair in "CARGO_HOME=$cargo_home" "RUSTUP_HOME=$rustup_home" CARGO_NET_OFFLINE=true ${BUILD_ENV:-} \
+  "PATH=$cargo_home/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"; do
+  buildah config --env "$pair" "$toolchain"
+done
+buildah commit -q --rm "$toolchain" localhost/nephroid-toolchain > /dev/null
+buildah bud --build-arg BUILD_IMAGE=localhost/nephroid-toolchain --build-arg BASE_IMAGE=localhost/nephroid-base \
   -v "$cargo_home:$cargo_home" -v "$rustup_home:$rustup_home" -v "$PWD/target/image:/src/target" \
-  --env CARGO_HOME="$cargo_home" --env RUSTUP_HOME="$rustup_home" --env CARGO_NET_OFFLINE=true \
-  --env PATH="$cargo_home/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin" \
   --format docker -t localhost/nephroid .
 
 container=$(buildah from localhost/nephroid)

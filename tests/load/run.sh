@@ -62,7 +62,7 @@ for _ in 1 2 3 4 5; do
 done | sort -n | awk '{ t[NR] = $1 } END { printf "%-58s %9.1f ms (median of 5)\n", "64×64 by the command", t[3] / 1e6 }'
 stop
 
-scene 400 300 "${ROUNDS:-150}" > "$work/long.json"
+scene 200 150 "${ROUNDS:-16}" > "$work/long.json"
 start
 ticks() { awk '{ print $14 + $15 }' "/proc/$1/stat"; }
 before=$(ticks "$server")
