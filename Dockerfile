@@ -9,8 +9,8 @@
 # compose.yaml does the latter and publishes the port on loopback alone.
 
 # Other images with a Rust toolchain or with glibc will do: see `make image`.
-ARG BUILD_IMAGE=docker.io/library/rust:1.95-bookworm
-ARG BASE_IMAGE=docker.io/library/debian:bookworm-slim
+ARG BUILD_IMAGE=rust:1.95-bookworm
+ARG BASE_IMAGE=debian:bookworm-slim
 
 FROM ${BUILD_IMAGE} AS build
 WORKDIR /src
