@@ -1,4 +1,4 @@
-.PHONY: serve test bench browser gallery openapi crash load fuzz
+.PHONY: serve test bench browser gallery openapi crash load fuzz image
 
 # Builds and starts the service on http://127.0.0.1:8080; settings as flags, e.g. `make serve ARGS="--threads 4"`.
 serve:
@@ -39,3 +39,7 @@ load:
 fuzz:
 	cargo build --release --package nephroid-api --bins
 	bash tests/load/fuzz.sh
+
+# The container image, with Docker or, without one, with buildah; starts it and renders one scene.
+image:
+	bash tests/image/run.sh

@@ -32,6 +32,12 @@ pub enum Command {
         #[command(subcommand)]
         action: KeyAction,
     },
+    /// Ask the service on this machine whether it takes jobs: exit code 0 if it does
+    Ready {
+        /// Address that it listens on
+        #[arg(long, env = "NEPHROID_LISTEN", default_value = "127.0.0.1:8080")]
+        listen: SocketAddr,
+    },
     /// Print the OpenAPI document
     Openapi,
 }

@@ -5,14 +5,18 @@ use nephroid_api::AppState;
 use nephroid_api::config::{Cli, Command, KeyAction, LogFormat, Settings};
 use nephroid_api::jobs::KeyAdmin;
 use std::error::Error;
-use std::io::{IsTerminal, Write};
-use std::net::TcpListener;
+use std::io::{IsTerminal, Read, Write};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::process::ExitCode;
+use std::time::Duration;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 
 /// The service must not be started like this.
 const REFUSED: u8 = 2;
+
+/// How long the health check waits for the service.
+const PATIENCE: Duration = Duration::from_secs(3);
 
 fn main() -> ExitCode {
     let done = match Cli::parse().into_command() {
@@ -20,6 +24,7 @@ fn main() -> ExitCode {
         Command::Keys { data, action } => {
             KeyAdmin::open(&data).map_err(Into::into).and_then(|keys| manage(&keys, action))
         }
+        Command::Ready { listen } => ask_ready(listen).map_err(Into::into),
         Command::Openapi => print(&nephroid_api::openapi::text()),
     };
     done.unwrap_or_else(|error| {
@@ -73,6 +78,19 @@ fn manage(keys: &KeyAdmin, action: KeyAction) -> Result<ExitCode, Box<dyn Error>
             Err(format!("there is no key {id} in force").into())
         }
     }
+}
+
+/// The health check of the container, which has no other client in it.
+fn ask_ready(mut listen: SocketAddr) -> std::io::Result<ExitCode> {
+    if listen.ip().is_unspecified() {
+        listen.set_ip(IpAddr::V4(Ipv4Addr::LOCALHOST));
+    }
+    let mut stream = TcpStream::connect_timeout(&listen, PATIENCE)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.write_all(b"GET /readyz HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n")?;
+    let mut answer = [0; 12];
+    stream.read_exact(&mut answer)?;
+    Ok(if answer.ends_with(b" 200") { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn print(text: &str) -> Result<ExitCode, Box<dyn Error>> {

@@ -41,7 +41,9 @@ function placeAt(text, caret) {
   }
   const frame = stack.at(-1);
   if (!frame) return null;
-  const to = from < caret ? Math.max(caret, tokenEnd(text, from)) : caret;
+  // A string that is not closed yet seems to go on to the next quote: what is replaced is the word at the caret.
+  const rest = from < caret ? text.slice(caret).match(text[from] === '"' ? /^[\w-]*"?/ : /^[\w.+-]*/)[0] : "";
+  const to = caret + rest.length;
   return { stack, from, to, role: frame.kind === "{" && !frame.colon ? "key" : "value" };
 }
 
@@ -101,9 +103,9 @@ function memberOf(text, start, name) {
   return null;
 }
 
-function keyItems({ found }, { stack, from }, text) {
+function keyItems({ found }, { stack, to }, text) {
   const frame = stack.at(-1);
-  const after = text.slice(tokenEnd(text, from)).trimStart();
+  const after = text.slice(to).trimStart();
   const items = new Map();
   for (const schema of found) {
     for (const [key, member] of Object.entries(schema.properties ?? {})) {

@@ -69,11 +69,12 @@ async function loadSamples() {
   const first = Math.max(0, samples.findIndex((sample) => sample.name === "glass-ball"));
   if (!samples.length || editor.text) return;
   $("samples").querySelectorAll("input")[first].checked = true;
-  chooseSample(samples[first], texts[first]);
+  setScene(texts[first]);
+  chosen = samples[first];
 }
 
 function card(sample, text) {
-  const label = make("label", "card");
+  const label = Object.assign(make("label", "card"), { title: sample.title });
   const input = Object.assign(make("input"), { type: "radio", name: "sample", value: sample.name });
   input.addEventListener("change", () => chooseSample(sample, text));
   label.append(input, sample.picture ? pictureOf(sample) : sketchOf(text), make("span", "card-title", sample.title));

@@ -33,7 +33,7 @@ impl Drop for Driver {
     }
 }
 
-async fn open_browser(driver: &Driver, profile: &std::path::Path) -> Client {
+async fn open_browser(driver: &Driver, profile: &std::path::Path, mut options: Value) -> Client {
     let arguments = [
         "--headless",
         "--no-sandbox",
@@ -46,7 +46,8 @@ async fn open_browser(driver: &Driver, profile: &std::path::Path) -> Client {
         "--window-size=1280,1000",
         &format!("--user-data-dir={}", profile.display()),
     ];
-    let capabilities = json!({ "goog:chromeOptions": { "args": arguments } });
+    options["args"] = json!(arguments);
+    let capabilities = json!({ "goog:chromeOptions": options });
     let Value::Object(capabilities) = capabilities else { unreachable!("an object was written") };
     // The driver takes a moment to listen.
     until(async || {
@@ -60,47 +61,189 @@ async fn run(browser: &Client, script: &str) -> Value {
     browser.execute(script, Vec::new()).await.unwrap()
 }
 
+/// Waits until a script gives something else than null or false.
+async fn seen(browser: &Client, script: &str) -> Value {
+    let wanted = |value: &Value| !value.is_null() && value != &json!(false);
+    until(async || Some(run(browser, script).await).filter(wanted)).await
+}
+
+async fn click(browser: &Client, selector: &str) {
+    let element = browser.wait().at_most(DEADLINE).for_element(Locator::Css(selector)).await.unwrap();
+    element.click().await.unwrap();
+}
+
+/// Puts a text into the editor as if it had been typed.
+async fn edit(browser: &Client, change: &str) {
+    let script = format!(
+        "const area = document.getElementById('scene'); area.value = ({change})(area.value);
+         area.dispatchEvent(new Event('input'));"
+    );
+    run(browser, &script).await;
+}
+
+/// Makes the sample in the editor so small that a test need not wait.
+async fn shrink(browser: &Client, [width, height]: [u32; 2], rounds: u32) {
+    let change = format!(
+        "(text) => {{ const scene = JSON.parse(text); Object.assign(scene.image, {{ width: {width}, height: {height} }});
+         scene.render = {{ ...scene.render, stop: {{ rounds: {rounds} }} }}; return JSON.stringify(scene, null, 2); }}"
+    );
+    edit(browser, &change).await;
+}
+
+const SUCCEEDED: &str = "span#state[data-state=succeeded]";
+/// The picture in the frame: its address and size.
+const SHOWN: &str = "const image = document.getElementById('image');
+    return !image.hidden && image.complete && image.naturalWidth ? [image.src, image.naturalWidth, image.naturalHeight] : null";
+
 #[tokio::test]
-async fn a_visitor_renders_a_sample_and_sees_a_wrong_line() {
+async fn a_visitor_mends_a_scene_watches_it_and_takes_it_home() {
     let (data, profile) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let server = Server::start(data.path(), &[]);
     let driver = Driver::start();
-    let browser = open_browser(&driver, profile.path()).await;
+    let browser = open_browser(&driver, profile.path(), json!({})).await;
     browser.goto(&server.base).await.unwrap();
+    click(&browser, "input[name=sample][value=glass-ball]").await;
+    shrink(&browser, [160, 120], 64).await;
 
-    let card = "input[name=sample][value=glass-ball]";
-    let sample = browser.wait().at_most(DEADLINE).for_element(Locator::Css(card)).await.unwrap();
-    sample.click().await.unwrap();
-    // Small and short, so that the test is; the way is the same.
-    run(
-        &browser,
-        "const area = document.getElementById('scene'); const scene = JSON.parse(area.value);
-         Object.assign(scene.image, { width: 64, height: 48 }); scene.render.stop = { rounds: 3 };
-         area.value = JSON.stringify(scene, null, 2); area.dispatchEvent(new Event('input'));",
-    )
-    .await;
-    browser.find(Locator::Id("submit")).await.unwrap().click().await.unwrap();
-    let state = "span#state[data-state=succeeded]";
-    browser.wait().at_most(DEADLINE).for_element(Locator::Css(state)).await.unwrap();
-    let shown = "const image = document.getElementById('image');
-        return !image.hidden && image.src.endsWith('/image.png') ? [image.naturalWidth, image.naturalHeight] : null";
-    let size = until(async || Some(run(&browser, shown).await).filter(|size| !size.is_null())).await;
-    assert_eq!(size, json!([64, 48]));
-    let download = browser.find(Locator::Id("download")).await.unwrap();
-    let href = download.attr("href").await.unwrap().unwrap();
-    assert_eq!(server.get(&href).await.headers()["content-type"], "image/png");
-
-    run(
-        &browser,
-        "const area = document.getElementById('scene');
-         area.value = area.value.replace('\"radius\"', '\"extra\": 1, \"radius\"'); area.dispatchEvent(new Event('input'));",
-    )
-    .await;
-    browser.find(Locator::Id("submit")).await.unwrap().click().await.unwrap();
-    let problem = "#problem:not([hidden]) code";
-    browser.wait().at_most(DEADLINE).for_element(Locator::Css(problem)).await.unwrap();
+    // A mistake is shown at its line while it is typed, and is selected when it is submitted.
+    edit(&browser, "(text) => text.replace('\"radius\"', '\"extra\": 1, \"radius\"')").await;
+    let marked =
+        "const mark = document.querySelector('#gutter .wrong'); return mark && mark.textContent.trim()";
+    let line = seen(&browser, marked).await;
+    click(&browser, "#submit").await;
     let selected = "const area = document.getElementById('scene');
-        return area.value.slice(area.selectionStart, area.selectionEnd)";
-    assert!(run(&browser, selected).await.as_str().unwrap().contains("extra"));
+        const text = area.value.slice(area.selectionStart, area.selectionEnd);
+        return text.includes('extra') && String(area.value.slice(0, area.selectionStart).split('\\n').length)";
+    assert_eq!(seen(&browser, selected).await, line);
+    assert_eq!(server.get_json("/v1/renders").await["renders"], json!([]));
+
+    // Mended; the picture sharpens: previews after different numbers of rounds.
+    edit(&browser, "(text) => text.replace('\"extra\": 1, ', '')").await;
+    run(
+        &browser,
+        "window.rounds = new Set(); const image = document.getElementById('image');
+        new MutationObserver(() => image.dataset.rounds && window.rounds.add(image.dataset.rounds))
+            .observe(image, { attributes: true });",
+    )
+    .await;
+    click(&browser, "#submit").await;
+    browser.wait().at_most(DEADLINE).for_element(Locator::Css(SUCCEEDED)).await.unwrap();
+    let previews = run(&browser, "return window.rounds.size").await;
+    assert!(previews.as_u64() >= Some(3), "{previews} previews");
+    assert!(
+        run(&browser, "return document.querySelectorAll('#chart .dot').length").await.as_u64() >= Some(3)
+    );
+    assert!(
+        run(&browser, "return document.querySelectorAll('#decisions tr').length").await.as_u64() >= Some(3)
+    );
+    let shown = seen(&browser, SHOWN).await;
+    assert!(shown[0].as_str().unwrap().ends_with("/image.png") && shown[1] == 160, "{shown}");
+
+    check_layers(&browser).await;
+    for (id, kind) in
+        [("download", "image/png"), ("download-exr", "image/x-exr"), ("download-chart", "image/svg+xml")]
+    {
+        let href = browser.find(Locator::Id(id)).await.unwrap().attr("href").await.unwrap().unwrap();
+        assert_eq!(server.get(&href).await.headers()["content-type"], kind);
+    }
+    // The address of a job is enough to come back to it.
+    browser.refresh().await.unwrap();
+    browser.wait().at_most(DEADLINE).for_element(Locator::Css(SUCCEEDED)).await.unwrap();
+    cancel_another(&browser, &server).await;
+    browser.close().await.unwrap();
+}
+
+/// Switches layers off: one by one the picture changes, and without caustics the bright spot is gone.
+async fn check_layers(browser: &Client) {
+    let brightest = "const canvas = document.getElementById('mix'); if (canvas.hidden || canvas.width !== 160) return null;
+        const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+        let sum = 0; for (let i = 0; i < data.length; i += 4) sum += data[i]; return sum";
+    click(browser, "#layers button[data-layer=caustic]").await;
+    let without = seen(browser, brightest).await.as_u64().unwrap();
+    click(browser, "#layers button[data-layer=caustic]").await;
+    click(browser, "#layers button[data-layer=emitted]").await;
+    let with = until(async || run(browser, brightest).await.as_u64().filter(|&sum| sum != without)).await;
+    assert!(with > without, "{with} against {without}: caustics are light");
+    click(browser, "#layers button.map").await;
+    let map = "const image = document.getElementById('image');
+        return !image.hidden && image.src.endsWith('/error.png') && image.naturalWidth === 160";
+    seen(browser, map).await;
+}
+
+/// Starts a job that would not end, and cancels it.
+async fn cancel_another(browser: &Client, server: &Server) {
+    click(browser, "input[name=sample][value=glass-ball]").await;
+    shrink(browser, [160, 120], 1_000_000).await;
+    click(browser, "#submit").await;
+    browser.wait().at_most(DEADLINE).for_element(Locator::Css("#state[data-state=running]")).await.unwrap();
+    click(browser, "#cancel").await;
+    browser.wait().at_most(DEADLINE).for_element(Locator::Css("#state[data-state=cancelled]")).await.unwrap();
+    let list = server.get_json("/v1/renders").await;
+    assert_eq!(list["renders"][0]["state"], "cancelled");
+    assert_eq!(list["renders"][1]["state"], "succeeded");
+}
+
+#[tokio::test]
+async fn the_keyboard_is_enough_and_the_editor_knows_what_may_come() {
+    let (data, profile) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let server = Server::start(data.path(), &[]);
+    let driver = Driver::start();
+    let browser = open_browser(&driver, profile.path(), json!({})).await;
+    browser.goto(&server.base).await.unwrap();
+    seen(&browser, "return document.getElementById('scene').value.includes('glass')").await;
+    shrink(&browser, [48, 36], 2).await;
+    // A member of the first object, chosen from the list.
+    run(
+        &browser,
+        "const area = document.getElementById('scene'); area.focus();
+        const at = area.value.indexOf('{', area.value.indexOf('\"objects\"')) + 1;
+        area.setRangeText(' , ', at, at, 'start'); area.setSelectionRange(at + 1, at + 1);",
+    )
+    .await;
+    let scene = browser.find(Locator::Id("scene")).await.unwrap();
+    let offered = "const list = document.getElementById('completions');
+        return !list.hidden && [...list.querySelectorAll('.word')].map((word) => word.textContent)";
+    let list = until(async || {
+        scene.send_keys("\"vel").await.unwrap();
+        let list = Some(run(&browser, offered).await).filter(Value::is_array);
+        if list.is_none() {
+            // The schema is not there yet: take it back.
+            run(
+                &browser,
+                "const area = document.getElementById('scene');
+                area.setRangeText('', area.selectionStart - 4, area.selectionStart, 'start');",
+            )
+            .await;
+        }
+        list
+    })
+    .await;
+    assert_eq!(list, json!(["velocity"]));
+    scene.send_keys("\u{e007}[0, 0, 0]").await.unwrap();
+    let text = run(&browser, "return document.getElementById('scene').value").await;
+    assert!(text.as_str().unwrap().contains("\"velocity\": [0, 0, 0],"), "{text}");
+    scene.send_keys("\u{e009}\u{e007}").await.unwrap();
+    browser.wait().at_most(DEADLINE).for_element(Locator::Css(SUCCEEDED)).await.unwrap();
+    browser.close().await.unwrap();
+}
+
+#[tokio::test]
+async fn a_phone_shows_all_of_the_page_without_scrolling_aside() {
+    let (data, profile) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let server = Server::start(data.path(), &[]);
+    let driver = Driver::start();
+    let phone =
+        json!({ "mobileEmulation": { "deviceMetrics": { "width": 390, "height": 844, "pixelRatio": 2.0 } } });
+    let browser = open_browser(&driver, profile.path(), phone).await;
+    browser.goto(&server.base).await.unwrap();
+    seen(&browser, "return document.getElementById('scene').value.includes('glass')").await;
+    let wide = "return [...document.querySelectorAll('body *')].filter((element) => {
+        const box = element.getBoundingClientRect();
+        return box.width && box.right > 391 && !element.closest('.cards, .editor, .skip') && !element.ownerSVGElement;
+    }).map((element) => element.outerHTML.slice(0, 80))";
+    assert_eq!(run(&browser, wide).await, json!([]));
+    assert_eq!(run(&browser, "return document.documentElement.scrollWidth").await, 390);
+    browser.goto(&format!("{}/docs", server.base)).await.unwrap();
+    seen(&browser, "return document.querySelectorAll('.operation').length > 15").await;
     browser.close().await.unwrap();
 }

@@ -10,7 +10,7 @@ trap '[ -z "${server:-}" ] || kill "$server" 2>/dev/null || true; rm -rf "$work"
 NEPHROID_LOG=error target/release/nephroid-api --listen 127.0.0.1:0 --data "$work/data" --max-seconds 1 \
   --max-pixels 100000 --queue 20 > "$work/out" &
 server=$!
-until grep -q listening "$work/out"; do kill -0 "$server"; sleep 0.05; done
+until grep -qs listening "$work/out"; do kill -0 "$server"; sleep 0.05; done
 api=$(sed 's/listening on //' "$work/out")
 schemathesis run "$api/openapi.json" --url "$api" --checks not_a_server_error,status_code_conformance \
   --max-examples "${EXAMPLES:-200}" --phases examples,coverage,fuzzing --request-timeout 40 --workers 2 --no-color

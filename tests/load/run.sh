@@ -12,10 +12,10 @@ trap '[ -z "${server:-}" ] || kill "$server" 2>/dev/null || true; rm -rf "$work"
 
 # Starts the service with these flags on a free port; sets $server and $api.
 start() {
-  rm -rf "$work/data"
+  rm -rf "$work/data" "$work/out"
   NEPHROID_LOG=warn "$bin/nephroid-api" --listen 127.0.0.1:0 --data "$work/data" "$@" > "$work/out" &
   server=$!
-  until grep -q listening "$work/out"; do kill -0 "$server"; sleep 0.05; done
+  until grep -qs listening "$work/out"; do kill -0 "$server"; sleep 0.05; done
   api=$(sed 's/listening on //' "$work/out")
 }
 stop() { kill "$server"; wait "$server" || true; server=; }
@@ -30,7 +30,7 @@ submit() { curl -sf "$api/v1/renders" -H 'Content-Type: application/json' -d "$1
 cat > "$work/post.lua" <<LUA
 wrk.method = "POST"
 wrk.headers["Content-Type"] = "application/json"
-wrk.body = [[$(scene 64 64 1)]]
+wrk.body = [=[$(scene 64 64 1)]=]
 LUA
 
 # The renderer is idle: nothing is taken from the queue.
@@ -62,7 +62,7 @@ for _ in 1 2 3 4 5; do
 done | sort -n | awk '{ t[NR] = $1 } END { printf "%-58s %9.1f ms (median of 5)\n", "64×64 by the command", t[3] / 1e6 }'
 stop
 
-scene 400 300 "${ROUNDS:-150}" > "$work/long.json"
+scene 200 150 "${ROUNDS:-16}" > "$work/long.json"
 start
 ticks() { awk '{ print $14 + $15 }' "/proc/$1/stat"; }
 before=$(ticks "$server")
