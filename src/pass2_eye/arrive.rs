@@ -118,26 +118,27 @@ impl EyeWalk<'_> {
     fn see_photons(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, sums: &mut PixelSums) {
         let view = view_code(arrival.hit.sheet, branch.key);
         let footprint = branch.main && self.view == Some(view);
-        if let Some(albedo) = bsdf.albedo() {
+        let gain = bsdf.albedo().map(|albedo| {
             // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
-            let gain = branch.throughput * albedo / std::f32::consts::PI;
-            if footprint {
-                sums.gain += gain;
-            } else if self.at_border(branch) && self.borrow(view, arrival, gain) {
-                return;
-            }
+            branch.throughput * albedo / std::f32::consts::PI
+        });
+        if let Some(gain) = gain.filter(|_| footprint) {
+            sums.gain += gain;
         }
-        match self.lookups {
-            Lookups::Nowhere => {}
-            Lookups::OffFootprint if footprint => {}
+        let looked_up = match self.lookups {
+            Lookups::Nowhere => Vec3::ZERO,
+            Lookups::OffFootprint if footprint => Vec3::ZERO,
             Lookups::OffFootprint | Lookups::Everywhere => {
-                self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums);
+                self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums)
             }
+        };
+        if let Some(gain) = gain.filter(|_| self.at_border(branch)) {
+            self.borrow(view, arrival, gain, looked_up);
         }
     }
 
     /// The photons around the point, with a kernel of about a pixel times a factor; apart where they are in different
-    /// pictures.
+    /// pictures. Returns their radiance where all are in one.
     fn see_looked_up(
         &mut self,
         branch: &Branch,
@@ -145,18 +146,20 @@ impl EyeWalk<'_> {
         (bsdf, wider): (&Bsdf, f32),
         class: PathClass,
         sums: &mut PixelSums,
-    ) {
-        let Some(photons) = self.context.photons else { return };
+    ) -> Vec3 {
+        let Some(photons) = self.context.photons else { return Vec3::ZERO };
         let Some(language) = &self.context.plan.language else {
-            let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), |_| true);
-            self.add(class, PICTURE, branch.throughput * radiance, sums);
-            return;
+            let radiance =
+                branch.throughput * self.look_up(photons, branch, arrival, (bsdf, wider), |_| true);
+            self.add(class, PICTURE, radiance, sums);
+            return radiance;
         };
         for &pictures in language.parts(branch.trail) {
             let pick = |kind: Kind| language.pictures(branch.trail, kind) == pictures;
             let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), pick);
             self.add(class, pictures, branch.throughput * radiance, sums);
         }
+        Vec3::ZERO
     }
 
     /// Radiance by density estimation around the point, of the photons that are picked.
