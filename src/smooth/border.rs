@@ -14,6 +14,9 @@ use glam::Vec3;
 /// Half width of the window over which both are averaged, in pixels.
 const WINDOW: usize = 8;
 
+/// The bias is taken for real if it is so many times its standard error.
+const SURE: f64 = 1.6;
+
 /// What a pixel's irradiance is to those that borrow it.
 pub(super) struct Lent {
     /// What smoothing adds to it.
@@ -70,13 +73,16 @@ pub(super) fn borrowers(film: &Film, samples: &[Sample], lent: &[Lent], floor: f
         Sums::new(size, plane.into_iter())
     };
     let (bias, noise) = (plane(&|border| border.bias), plane(&|border| border.noise));
+    let spread = plane(&|border| border.bias * border.bias);
     let counts = plane(&|_| 1.0);
     let choose = |border: &Border| {
         let mut borrower = border.borrower;
         let at = (borrower.pixel as usize % size.0, borrower.pixel as usize / size.0);
         let around = bias.around(at, WINDOW);
         borrower.squared_error += (around / counts.around(at, WINDOW)).max(0.0) as f32 / border.weight;
-        (around < noise.around(at, WINDOW)).then_some(borrower)
+        // Few spikes make up a large sum: what is no bias of many pixels is none.
+        let certain = around > SURE * spread.around(at, WINDOW).sqrt();
+        (around < noise.around(at, WINDOW) || !certain).then_some(borrower)
     };
     borders.iter().filter(|border| border.weight > 0.0).filter_map(choose).collect()
 }
