@@ -46,15 +46,21 @@ impl EyeWalk<'_> {
             // The paths asked for end at the last D.
             return true;
         }
-        let mut branch = *branch;
-        self.extend(&mut branch, Bounce::Diffuse);
-        self.see_lights(&branch, arrival, &bsdf, sums);
+        // A branch is large: it is copied only where its trail goes on.
+        let extended = self
+            .context
+            .plan
+            .language
+            .as_ref()
+            .map(|language| Branch { trail: language.step(branch.trail, Bounce::Diffuse), ..*branch });
+        let branch = extended.as_ref().unwrap_or(branch);
+        self.see_lights(branch, arrival, &bsdf, sums);
         if seen > 1 {
-            self.see_looked_up(&branch, arrival, (&bsdf, INDIRECT_WIDTH), PathClass::Indirect, sums);
+            self.see_looked_up(branch, arrival, (&bsdf, INDIRECT_WIDTH), PathClass::Indirect, sums);
         } else {
-            self.see_photons(&branch, arrival, &bsdf, sums);
+            self.see_photons(branch, arrival, &bsdf, sums);
         }
-        self.leave(&branch, arrival, &bsdf, seen);
+        self.leave(branch, arrival, &bsdf, seen);
         true
     }
 
