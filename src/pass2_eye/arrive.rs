@@ -1,7 +1,7 @@
 //! Pass 2 at a D: what it emits, the lights it sees, the photons that rest on it; and, where more is asked for than the
 //! light that comes from the lights or through mirrors and glass, `L(D|S)*DS*DS*E`, a ray that goes on from it.
 
-use super::direct::{Receiver, density_toward, direct_light, power_heuristic};
+use super::direct::{Receiver, asked_times, density_toward, direct_light, power_heuristic};
 use super::footprint::view_code;
 use super::specular::{Branch, EyeWalk, Lookups, Scattered};
 use crate::bsdf::Bsdf;
@@ -10,6 +10,7 @@ use crate::light_path::{Bounce, Kind, PICTURE, PathClass};
 use crate::optics::Arrival;
 use crate::pass1_light::{RoundPhotons, Source};
 use crate::photon_map::{Incoming, Lookup, Nearest};
+use crate::plan::Asking;
 use crate::radius::{PIXEL, Reach};
 use crate::sampling::hash;
 use crate::scene::LightPoint;
@@ -46,15 +47,21 @@ impl EyeWalk<'_> {
             // The paths asked for end at the last D.
             return true;
         }
-        let mut branch = *branch;
-        self.extend(&mut branch, Bounce::Diffuse);
-        self.see_lights(&branch, arrival, &bsdf, sums);
+        // A branch is large: it is copied only where its trail goes on.
+        let extended = self
+            .context
+            .plan
+            .language
+            .as_ref()
+            .map(|language| Branch { trail: language.step(branch.trail, Bounce::Diffuse), ..*branch });
+        let branch = extended.as_ref().unwrap_or(branch);
+        self.see_lights(branch, arrival, &bsdf, sums);
         if seen > 1 {
-            self.see_looked_up(&branch, arrival, (&bsdf, INDIRECT_WIDTH), PathClass::Indirect, sums);
+            self.see_looked_up(branch, arrival, (&bsdf, INDIRECT_WIDTH), PathClass::Indirect, sums);
         } else {
-            self.see_photons(&branch, arrival, &bsdf, sums);
+            self.see_photons(branch, arrival, &bsdf, sums);
         }
-        self.leave(&branch, arrival, &bsdf, seen);
+        self.leave(branch, arrival, &bsdf, seen);
         true
     }
 
@@ -65,7 +72,8 @@ impl EyeWalk<'_> {
             return;
         }
         let (scene, sample) = (self.context.scene, self.sample.branch(branch.key));
-        let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf, time: branch.ray.time };
+        let tree = self.context.plan.light_tree.as_ref();
+        let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf, time: branch.ray.time, tree };
         let mut shadow_rays = 0;
         if self.context.plan.language.is_none() {
             let mut direct = Vec3::ZERO;
@@ -101,7 +109,9 @@ impl EyeWalk<'_> {
             None => (PathClass::Emitted, 1.0),
             Some(Scattered { straight: true, pdf: Some(pdf), count, point }) => {
                 let at = LightPoint { point: surface.point, normal: surface.normal, error: surface.error };
-                let other = density_toward(light, point, &at).unwrap_or(0.0);
+                let tree = self.context.plan.light_tree.as_ref();
+                let times = asked_times(tree, &Asking { point, normal: None }, id);
+                let other = density_toward(light, point, &at).unwrap_or(0.0) * times;
                 (PathClass::with_light_after(count), power_heuristic(pdf, other))
             }
             // Light over mirrors or glass: the photons' part, unless rays are to find it.

@@ -21,6 +21,7 @@ mod invariance;
 mod light_images;
 mod light_sampling;
 mod lights;
+mod many_lights;
 mod materials;
 mod motion;
 mod optics;
