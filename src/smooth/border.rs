@@ -1,21 +1,17 @@
-//! Pixels at borders: what was looked up around their eye samples, or what the pixels beside them lend.
+//! Pixels at borders: what the pixels beside them lend takes the place of what was looked up around their eye samples.
 //!
-//! A look-up holds a handful of photons; what is lent is smoothed, but lies a pixel or two aside. As for the widths, the two
-//! halves of the film tell which is better: with L what was looked up and b what is borrowed, (L_A - b_A)(L_B - b_B) estimates
-//! the squared bias of borrowing, and (L_A - L_B)²/4 the noise of looking up, both without bias. Where photons are so few
-//! that most look-ups find none, both halves agree on nothing: the noise is then at least that of as many photons on the
-//! lender's footprint.
+//! A look-up holds a handful of photons; what is lent is smoothed, but lies a pixel or two aside. With L what was looked up
+//! and b what is borrowed, the halves of the film estimate the squared bias of borrowing, (L_A - b_A)(L_B - b_B), without
+//! bias: it is part of the error. To choose by it, pixel by pixel, was tried: looking up is then chosen where both halves
+//! hold a spike, and the picture gets brighter.
 
 use super::ladder::Sums;
 use super::{Sample, mean_channel};
 use crate::film::{Film, Loan};
 use glam::Vec3;
 
-/// Half width of the window over which both are averaged, in pixels.
+/// Half width of the window over which the bias is averaged, in pixels.
 const WINDOW: usize = 8;
-
-/// The bias is taken for real if it is so many times its standard error.
-const SURE: f64 = 1.6;
 
 /// What a pixel's irradiance is to those that borrow it.
 pub(super) struct Lent {
@@ -52,14 +48,13 @@ pub struct Borrower {
 #[derive(Clone, Copy)]
 struct Border {
     borrower: Borrower,
-    /// Weighted squared bias and noise.
+    /// Weighted squared bias.
     bias: f32,
-    noise: f32,
     /// One over the squared radiance that errors are relative to.
     weight: f32,
 }
 
-/// The pixels that do better to borrow, in their order.
+/// The pixels that borrow, in their order.
 pub(super) fn borrowers(film: &Film, samples: &[Sample], lent: &[Lent], floor: f32) -> Vec<Borrower> {
     let borders: Vec<Border> = film
         .loans()
@@ -72,19 +67,16 @@ pub(super) fn borrowers(film: &Film, samples: &[Sample], lent: &[Lent], floor: f
         borders.iter().for_each(|border| plane[border.borrower.pixel as usize] = f64::from(value(border)));
         Sums::new(size, plane.into_iter())
     };
-    let (bias, noise) = (plane(&|border| border.bias), plane(&|border| border.noise));
-    let spread = plane(&|border| border.bias * border.bias);
+    let bias = plane(&|border| border.bias);
     let counts = plane(&|_| 1.0);
     let choose = |border: &Border| {
         let mut borrower = border.borrower;
         let at = (borrower.pixel as usize % size.0, borrower.pixel as usize / size.0);
         let around = bias.around(at, WINDOW);
         borrower.squared_error += (around / counts.around(at, WINDOW)).max(0.0) as f32 / border.weight;
-        // Few spikes make up a large sum: what is no bias of many pixels is none.
-        let certain = around > SURE * spread.around(at, WINDOW).sqrt();
-        (around < noise.around(at, WINDOW) || !certain).then_some(borrower)
+        borrower
     };
-    borders.iter().filter(|border| border.weight > 0.0).filter_map(choose).collect()
+    borders.iter().filter(|border| border.weight > 0.0).map(choose).collect()
 }
 
 impl Border {
@@ -92,7 +84,7 @@ impl Border {
         let pixel = loans[0].borrower;
         let (mut looked_up, mut borrowed) = ([Vec3::ZERO; 2], [Vec3::ZERO; 2]);
         let (mut smooth, mut coverage) = (Vec3::ZERO, Vec3::ZERO);
-        let (mut squared_error, mut least_noise) = (0.0, 0.0);
+        let mut squared_error = 0.0;
         for loan in loans {
             let (gain, found) = (film.gain(loan), film.looked_up(loan));
             let (sample, lent) = (&samples[loan.lender as usize], &lent[loan.lender as usize]);
@@ -105,15 +97,13 @@ impl Border {
             smooth += mean_gain * irradiance;
             coverage += 0.5 * (gain[0] - gain[1]) * irradiance;
             squared_error += lent.squared_error * mean_channel(mean_gain * mean_gain);
-            least_noise += Lent::raw(sample).squared_error * mean_channel(mean_gain * mean_gain);
         }
         let radiance = mean_channel(samples[pixel as usize].rest) + floor;
         let weight = if radiance > 0.0 { radiance.powi(-2) } else { 0.0 };
         let replaced = 0.5 * (looked_up[0] - looked_up[1]);
         let bias = mean_channel((looked_up[0] - borrowed[0]) * (looked_up[1] - borrowed[1])) * weight;
-        let noise = mean_channel(replaced * replaced).max(least_noise) * weight;
         let correction = smooth - 0.5 * (looked_up[0] + looked_up[1]);
         let borrower = Borrower { pixel, correction, squared_error, replaced, coverage };
-        Self { borrower, bias, noise, weight }
+        Self { borrower, bias, weight }
     }
 }
