@@ -59,10 +59,6 @@ pub struct PixelMeans {
     pub irradiance: [Vec3; 2],
     /// Radiance of the pixel per irradiance of its footprint.
     pub gain: Vec3,
-    /// The part of the caustic class that is borrowed from pixels beside it, in each half.
-    pub borrowed: [Vec3; 2],
-    /// Half of what the halves' difference of `borrowed` owes to the places of their eye samples.
-    pub coverage: Vec3,
 }
 
 impl PixelMeans {
@@ -139,7 +135,7 @@ impl PixelSums {
             means.add(PathClass::Caustic, gain * half.irradiance * per_photon);
             means
         });
-        PixelMeans { halves, irradiance, gain, ..PixelMeans::default() }
+        PixelMeans { halves, irradiance, gain }
     }
 
     /// The class that holds a number that is not finite, if any.
@@ -241,6 +237,9 @@ impl Film {
 
     fn add(&mut self, mut round: RoundFilm, photon_weight: f32) {
         self.photon_weight += photon_weight;
+        for loan in &mut round.loans {
+            loan.looked_up = loan.looked_up.map(|radiance| radiance * photon_weight);
+        }
         Loan::merge(&mut self.loans, &round.loans);
         for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
             pixel.weigh_photons(photon_weight, self.caustics);
@@ -253,25 +252,7 @@ impl Film {
 
     /// Means of every pixel, row by row.
     pub fn means(&self) -> impl Iterator<Item = PixelMeans> + '_ {
-        let mut loans = self.loans.as_slice();
-        self.pixels.iter().enumerate().map(move |(i, pixel)| {
-            let mut means = pixel.means(self.photon_weight, self.caustics);
-            let mine = loans.iter().take_while(|loan| loan.borrower as usize == i).count();
-            let (mine, rest) = loans.split_at(mine);
-            loans = rest;
-            mine.iter().for_each(|loan| self.borrow(&mut means, loan));
-            means
-        })
-    }
-
-    fn borrow(&self, means: &mut PixelMeans, loan: &Loan) {
-        let lender = self.pixels[loan.lender as usize].means(self.photon_weight, self.caustics);
-        let gain = self.gain(loan);
-        for (half, (gain, irradiance)) in gain.into_iter().zip(lender.irradiance).enumerate() {
-            means.borrowed[half] += gain * irradiance;
-            means.halves[half].add(PathClass::Caustic, gain * irradiance);
-        }
-        means.coverage += 0.25 * (gain[0] - gain[1]) * (lender.irradiance[0] + lender.irradiance[1]);
+        self.pixels.iter().map(|pixel| pixel.means(self.photon_weight, self.caustics))
     }
 
     /// The borrower's mean radiance per irradiance of the lender's footprint, in each half.
@@ -281,7 +262,14 @@ impl Film {
         loan.gain.map(|gain| gain * per_sample)
     }
 
-    /// What pixels at borders borrow.
+    /// What look-ups found in place of a loan: mean radiance of each half.
+    #[must_use]
+    pub fn looked_up(&self, loan: &Loan) -> [Vec3; 2] {
+        let per_photon = if self.photon_weight > 0.0 { 1.0 / self.photon_weight } else { 0.0 };
+        loan.looked_up.map(|radiance| radiance * per_photon)
+    }
+
+    /// What pixels at borders may borrow.
     #[must_use]
     pub fn loans(&self) -> &[Loan] {
         &self.loans

@@ -109,16 +109,18 @@ impl<'a> Picture<'a> {
         }
         let half = |class| 0.5 * (means.halves[0].get(class) - means.halves[1].get(class));
         let mut sampled = half(PathClass::Emitted) + half(PathClass::Direct) + half(PathClass::Indirect);
-        // What is borrowed differs by where the eye samples fell, and by the photons of the lenders.
-        sampled += means.coverage;
-        let mut photons = half(PathClass::Caustic) - means.coverage;
+        let mut photons = half(PathClass::Caustic);
         if self.film.caustics() == Caustics::Backward {
             sampled += std::mem::take(&mut photons);
         }
         let smoothed = self.smoothing.as_ref().and_then(|s| s.squared_error[index]);
         if smoothed.is_some() {
             photons -= means.gain * 0.5 * (means.irradiance[0] - means.irradiance[1]);
-            photons -= 0.5 * (means.borrowed[0] - means.borrowed[1]) - means.coverage;
+        }
+        if let Some(borrower) = self.smoothing.as_ref().and_then(|s| s.borrower(index)) {
+            // What is borrowed differs by where the eye samples fell; what was looked up is no more in the picture.
+            sampled += borrower.coverage;
+            photons -= borrower.replaced;
         }
         let photons = photons * photons + Vec3::splat(smoothed.unwrap_or(0.0));
         PixelError {

@@ -13,11 +13,13 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 pub use asked::Layer;
+pub use light_tree::{Asking, LightTree};
 
 mod asked;
 mod carry;
 mod details;
 pub(crate) mod language;
+mod light_tree;
 mod reach;
 mod rivals;
 
@@ -38,6 +40,8 @@ pub struct Plan {
     pub radius: RadiusRule,
     /// What the eye is inside of.
     pub eye_media: Media,
+    /// Which lights a D asks, if there are too many to ask each.
+    pub light_tree: Option<LightTree>,
     /// Whether a ray can meet a light or the environment: highlights are then lit by scattered rays too.
     pub lights_can_be_met: bool,
     /// True if something moves while the shutter is open.
@@ -68,6 +72,18 @@ const PILOT_LOG2: u32 = 13;
 
 /// Least photons per window, half and round.
 const LEAST_LOG2: u32 = 8;
+
+/// From so many windows on, each gets fewer pilot photons, and may get fewer than that of a round: in all about as many as
+/// these would.
+const MANY_WINDOWS: usize = 32;
+
+/// By how many powers of two.
+fn fewer_log2(windows: usize) -> u32 {
+    (windows / MANY_WINDOWS).max(1).ilog2()
+}
+
+/// Least photons of a pilot: fewer of many windows would be taken for dark.
+const LEAST_PILOT_LOG2: u32 = 6;
 
 /// Each light image takes several rays, and is worth many photons: as many powers of two fewer are sent.
 const LESS_LOG2: u32 = 3;
@@ -102,6 +118,7 @@ impl Plan {
             layer_names: Vec::new(),
             caustics: None,
             radius: scene.render.radius,
+            light_tree: None,
             eye_media: Media::around(scene, scene.camera.eye),
             lights_can_be_met: !scene.environment.is_black()
                 || scene.lights.iter().any(|l| l.surface_radiance().is_some()),
@@ -179,8 +196,9 @@ impl Plan {
             self.decide("pass 1", false, "no photons", "no light gives light");
             return;
         }
+        let fewer = fewer_log2(windows.len());
         let pilots: Vec<Pilot> =
-            windows.into_par_iter().enumerate().map(|(i, w)| pilot(scene, w, i as u64)).collect();
+            windows.into_par_iter().enumerate().map(|(i, w)| pilot(scene, w, (i as u64, fewer))).collect();
         self.budget(scene, pilots);
     }
 
@@ -217,6 +235,7 @@ impl Plan {
         let pixels = u64::from(scene.image.width) * u64::from(scene.image.height);
         // The first round is small: what it finds decides how large the others are.
         let first_round = (pixels / 4).max(1).next_power_of_two();
+        let least = LEAST_LOG2.saturating_sub(fewer_log2(all));
         let per_round = first_round.ilog2().clamp(LEAST_LOG2, MOST_LOG2);
         for pilot in pilots {
             let share = delivered(&pilot) / total;
@@ -224,11 +243,11 @@ impl Plan {
                 continue;
             }
             // A power of two at least as large as the share: blocks of the sequence stay aligned.
-            let log2_block = (f64::from(per_round) + share.log2()).ceil().max(f64::from(LEAST_LOG2)) as u32;
+            let log2_block = (f64::from(per_round) + share.log2()).ceil().max(f64::from(least)) as u32;
             let carries = pilot.carries;
             let log2_block = match carries {
                 Carries::Points => log2_block,
-                Carries::LightImages => log2_block.saturating_sub(LESS_LOG2).max(LEAST_LOG2),
+                Carries::LightImages => log2_block.saturating_sub(LESS_LOG2).max(least),
             };
             self.photons.push(Budget { window: pilot.window, log2_block, carries });
         }
@@ -275,6 +294,7 @@ impl Plan {
             )
         };
         self.decide("direct light", true, choice, reason);
+        self.decide_selection(scene, lit);
         match &scene.environment {
             environment if environment.is_black() => {
                 self.decide("environment", false, "no rays", "the environment is black");
@@ -328,13 +348,13 @@ fn sent(pilots: &[Pilot]) -> u64 {
 }
 
 /// Sends a few photons through a window. The count is bounded: a window that delivers nothing is given up.
-fn pilot(scene: &Scene, mut window: Window, index: u64) -> Pilot {
+fn pilot(scene: &Scene, mut window: Window, (index, fewer): (u64, u32)) -> Pilot {
     const PILOT: u64 = 0;
     let seed = hash(hash(scene.render.seed, PILOT), index);
     let run = |window: &Window, log2: u32| {
         pass1_light::pilot(scene, window, Block { first: 0, count: 1 << log2, seed })
     };
-    let mut log2 = PILOT_LOG2;
+    let mut log2 = PILOT_LOG2.saturating_sub(fewer).max(LEAST_PILOT_LOG2);
     let (mut tally, mut guide, mut met) = run(&window, log2);
     if tally.stored == 0 {
         log2 += 4;
@@ -342,7 +362,11 @@ fn pilot(scene: &Scene, mut window: Window, index: u64) -> Pilot {
     }
     let aimed = scene.render.aiming == Aiming::Windows;
     window.guide = guide.filter(|_| aimed);
-    let carries = if aimed { carry::decide(scene, &window, hash(seed, index)) } else { Carries::Points };
+    // Trying images costs as much as a pilot of a few windows.
+    let carries = match fewer {
+        0..=2 if aimed => carry::decide(scene, &window, hash(seed, index)),
+        _ => Carries::Points,
+    };
     Pilot { window, tally, sent: 1 << log2, met, carries }
 }
 

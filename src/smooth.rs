@@ -9,11 +9,15 @@
 //!
 //! The main way of the eye through mirrors and glass is smoothed only; its fainter branches stay as they are.
 
+mod border;
 mod ladder;
 mod segment;
 
+pub use border::Borrower;
+
 use crate::film::{Film, PixelMeans};
 use crate::pass2_eye::Footprints;
+use border::Lent;
 use glam::Vec3;
 use ladder::Ladder;
 use rayon::prelude::*;
@@ -29,6 +33,17 @@ pub struct Smoothing {
     pub squared_error: Vec<Option<f32>>,
     /// The width chosen for each pixel; 0 where it stays as it was gathered.
     level: Vec<u8>,
+    /// Pixels at borders that take what the pixels beside them show, in their order.
+    borrowers: Vec<Borrower>,
+}
+
+impl Smoothing {
+    /// What a pixel borrows, if it does.
+    #[must_use]
+    pub fn borrower(&self, pixel: usize) -> Option<&Borrower> {
+        let at = self.borrowers.binary_search_by_key(&(pixel as u32), |borrower| borrower.pixel);
+        at.ok().map(|i| &self.borrowers[i])
+    }
 }
 
 /// Segments with fewer pixels tell too little about noise and blur.
@@ -77,14 +92,12 @@ pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
             lent[pixel as usize] = Lent { change, squared_error: choice.squared_error };
         }
     }
-    for loan in film.loans() {
-        let [a, b] = film.gain(loan);
-        let (gain, lent) = (0.5 * (a + b), &lent[loan.lender as usize]);
-        correction[loan.borrower as usize] += gain * lent.change;
-        let error = squared_error[loan.borrower as usize].get_or_insert(0.0);
-        *error += lent.squared_error * mean_channel(gain * gain);
+    let borrowers = border::borrowers(film, &samples, &lent, 0.1 * mean);
+    for borrower in &borrowers {
+        correction[borrower.pixel as usize] = borrower.correction;
+        squared_error[borrower.pixel as usize] = Some(borrower.squared_error);
     }
-    Some(Smoothing { correction, squared_error, level })
+    Some(Smoothing { correction, squared_error, level, borrowers })
 }
 
 /// What the same widths add to a part of the irradiance, per pixel: radiance. What they add to all parts is the whole's
@@ -116,22 +129,6 @@ fn lit_segments<'a>(
         .into_par_iter()
         .filter_map(|segment| segment.near(ladder::MOST_REACH, |i| samples[i].irradiance != [Vec3::ZERO; 2]))
         .filter(|segment| segment.pixels.len() >= LEAST_PIXELS)
-}
-
-/// What a pixel's irradiance is to those that borrow it.
-struct Lent {
-    /// What smoothing adds to it.
-    change: Vec3,
-    /// Estimated squared error that is left, mean over channels.
-    squared_error: f32,
-}
-
-impl Lent {
-    /// Where nothing is smoothed.
-    fn raw(sample: &Sample) -> Self {
-        let half = 0.5 * (sample.irradiance[0] - sample.irradiance[1]);
-        Self { change: Vec3::ZERO, squared_error: mean_channel(half * half) }
-    }
 }
 
 impl Sample {

@@ -17,7 +17,7 @@ impl Film {
             layer.to_array().into_iter().for_each(|value| bytes.extend(value.to_le_bytes()));
         }
         for loan in &self.loans {
-            loan.to_words().into_iter().for_each(|word| bytes.extend(word.to_le_bytes()));
+            loan.words().for_each(|word| bytes.extend(word.to_le_bytes()));
         }
         bytes
     }
@@ -44,7 +44,7 @@ impl Film {
         film.loans.clear();
         for bytes in loans {
             let mut words = bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
-            let loan = Loan::from_words(std::array::from_fn(|_| words.next().unwrap_or(0)));
+            let loan = Loan::from_words(|| words.next().unwrap_or(0));
             let known = |pixel: u32| (pixel as usize) < film.pixels.len();
             if !known(loan.borrower) || !known(loan.lender) {
                 return None;

@@ -1,9 +1,9 @@
-//! Pixels at borders borrow what photons bring from neighbours that show the same piece of surface.
+//! Pixels at borders may borrow what photons bring from neighbours that show the same piece of surface.
 //!
-//! A pixel that shows parts of several surfaces has no footprint of its own to count photons on. Each of its eye
-//! samples lands on the surface that some pixel beside it shows whole: that one's irradiance, counted on its footprint
-//! and smoothed, is better known than what a look-up around the sample would find, at the price of its being taken from a
-//! pixel or two aside.
+//! A pixel that shows parts of several surfaces has no footprint of its own to count photons on: they are looked up around
+//! its eye samples. But each of these lands on a surface that some pixel beside it shows whole, whose irradiance, counted
+//! on a footprint and smoothed, is less noisy, at the price of its being taken from a pixel or two aside. Both are kept;
+//! the smoothing chooses.
 
 use glam::Vec3;
 
@@ -16,11 +16,13 @@ pub struct Loan {
     pub lender: u32,
     /// The borrower's radiance per irradiance of the lender's footprint, summed over the eye samples of each half.
     pub gain: [Vec3; 2],
+    /// What look-ups found in its place: radiance, summed over rounds by their photons' weight, in each half.
+    pub looked_up: [Vec3; 2],
 }
 
 impl Loan {
     /// Bytes of a loan in a checkpoint.
-    pub(super) const BYTES: usize = 4 * 8;
+    pub(super) const BYTES: usize = 4 * 14;
 
     fn key(&self) -> (u32, u32) {
         (self.borrower, self.lender)
@@ -34,22 +36,27 @@ impl Loan {
         into.dedup_by(|next, first| {
             let same = next.key() == first.key();
             if same {
-                first.gain[0] += next.gain[0];
-                first.gain[1] += next.gain[1];
+                for half in 0..2 {
+                    first.gain[half] += next.gain[half];
+                    first.looked_up[half] += next.looked_up[half];
+                }
             }
             same
         });
     }
 
-    pub(super) fn to_words(self) -> [u32; 8] {
-        let [a, b] = self.gain.map(|gain| gain.to_array().map(f32::to_bits));
-        [self.borrower, self.lender, a[0], a[1], a[2], b[0], b[1], b[2]]
+    /// Its pixels and numbers, in a fixed order.
+    pub(super) fn words(&self) -> impl Iterator<Item = u32> + '_ {
+        let vectors = self.gain.iter().chain(&self.looked_up);
+        [self.borrower, self.lender].into_iter().chain(vectors.flat_map(|v| v.to_array()).map(f32::to_bits))
     }
 
-    pub(super) fn from_words(words: [u32; 8]) -> Self {
-        let [borrower, lender, a @ ..] = words;
-        let [x, y, z, u, v, w] = a.map(f32::from_bits);
-        Self { borrower, lender, gain: [Vec3::new(x, y, z), Vec3::new(u, v, w)] }
+    /// The inverse of [`Loan::words`].
+    pub(super) fn from_words(mut word: impl FnMut() -> u32) -> Self {
+        let (borrower, lender) = (word(), word());
+        let mut vector = || Vec3::from_array(std::array::from_fn(|_| f32::from_bits(word())));
+        let mut halves = || [vector(), vector()];
+        Self { borrower, lender, gain: halves(), looked_up: halves() }
     }
 }
 
@@ -63,11 +70,16 @@ mod tests {
             borrower,
             lender,
             gain: [Vec3::splat(g), Vec3::splat(2.0 * g)],
+            looked_up: [Vec3::splat(-g), Vec3::X * g],
         };
         let mut loans = Vec::new();
         Loan::merge(&mut loans, &[loan(7, 3, 1.0), loan(2, 9, 4.0), loan(7, 3, 2.0)]);
         Loan::merge(&mut loans, &[loan(7, 1, 1.0), loan(2, 9, 0.5)]);
         assert_eq!(loans, [loan(2, 9, 4.5), loan(7, 1, 1.0), loan(7, 3, 3.0)]);
-        assert!(loans.iter().all(|loan| Loan::from_words(loan.to_words()) == *loan));
+        for loan in &loans {
+            let mut words = loan.words();
+            assert_eq!(Loan::from_words(|| words.next().unwrap()), *loan);
+            assert_eq!(4 * loan.words().count(), Loan::BYTES);
+        }
     }
 }

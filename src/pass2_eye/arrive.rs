@@ -1,7 +1,7 @@
 //! Pass 2 at a D: what it emits, the lights it sees, the photons that rest on it; and, where more is asked for than the
 //! light that comes from the lights or through mirrors and glass, `L(D|S)*DS*DS*E`, a ray that goes on from it.
 
-use super::direct::{Receiver, density_toward, direct_light, power_heuristic};
+use super::direct::{Receiver, asked_times, density_toward, direct_light, power_heuristic};
 use super::footprint::view_code;
 use super::specular::{Branch, EyeWalk, Lookups, Scattered};
 use crate::bsdf::Bsdf;
@@ -10,6 +10,7 @@ use crate::light_path::{Bounce, Kind, PICTURE, PathClass};
 use crate::optics::Arrival;
 use crate::pass1_light::{RoundPhotons, Source};
 use crate::photon_map::{Incoming, Lookup, Nearest};
+use crate::plan::Asking;
 use crate::radius::{PIXEL, Reach};
 use crate::sampling::hash;
 use crate::scene::LightPoint;
@@ -46,15 +47,21 @@ impl EyeWalk<'_> {
             // The paths asked for end at the last D.
             return true;
         }
-        let mut branch = *branch;
-        self.extend(&mut branch, Bounce::Diffuse);
-        self.see_lights(&branch, arrival, &bsdf, sums);
+        // A branch is large: it is copied only where its trail goes on.
+        let extended = self
+            .context
+            .plan
+            .language
+            .as_ref()
+            .map(|language| Branch { trail: language.step(branch.trail, Bounce::Diffuse), ..*branch });
+        let branch = extended.as_ref().unwrap_or(branch);
+        self.see_lights(branch, arrival, &bsdf, sums);
         if seen > 1 {
-            self.see_looked_up(&branch, arrival, (&bsdf, INDIRECT_WIDTH), PathClass::Indirect, sums);
+            self.see_looked_up(branch, arrival, (&bsdf, INDIRECT_WIDTH), PathClass::Indirect, sums);
         } else {
-            self.see_photons(&branch, arrival, &bsdf, sums);
+            self.see_photons(branch, arrival, &bsdf, sums);
         }
-        self.leave(&branch, arrival, &bsdf, seen);
+        self.leave(branch, arrival, &bsdf, seen);
         true
     }
 
@@ -65,7 +72,8 @@ impl EyeWalk<'_> {
             return;
         }
         let (scene, sample) = (self.context.scene, self.sample.branch(branch.key));
-        let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf, time: branch.ray.time };
+        let tree = self.context.plan.light_tree.as_ref();
+        let receiver = Receiver { scene, surface: &arrival.hit.surface, bsdf, time: branch.ray.time, tree };
         let mut shadow_rays = 0;
         if self.context.plan.language.is_none() {
             let mut direct = Vec3::ZERO;
@@ -101,7 +109,9 @@ impl EyeWalk<'_> {
             None => (PathClass::Emitted, 1.0),
             Some(Scattered { straight: true, pdf: Some(pdf), count, point }) => {
                 let at = LightPoint { point: surface.point, normal: surface.normal, error: surface.error };
-                let other = density_toward(light, point, &at).unwrap_or(0.0);
+                let tree = self.context.plan.light_tree.as_ref();
+                let times = asked_times(tree, &Asking { point, normal: None }, id);
+                let other = density_toward(light, point, &at).unwrap_or(0.0) * times;
                 (PathClass::with_light_after(count), power_heuristic(pdf, other))
             }
             // Light over mirrors or glass: the photons' part, unless rays are to find it.
@@ -118,26 +128,27 @@ impl EyeWalk<'_> {
     fn see_photons(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, sums: &mut PixelSums) {
         let view = view_code(arrival.hit.sheet, branch.key);
         let footprint = branch.main && self.view == Some(view);
-        if let Some(albedo) = bsdf.albedo() {
+        let gain = bsdf.albedo().map(|albedo| {
             // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
-            let gain = branch.throughput * albedo / std::f32::consts::PI;
-            if footprint {
-                sums.gain += gain;
-            } else if self.at_border(branch) && self.borrow(view, arrival, gain) {
-                return;
-            }
+            branch.throughput * albedo / std::f32::consts::PI
+        });
+        if let Some(gain) = gain.filter(|_| footprint) {
+            sums.gain += gain;
         }
-        match self.lookups {
-            Lookups::Nowhere => {}
-            Lookups::OffFootprint if footprint => {}
+        let looked_up = match self.lookups {
+            Lookups::Nowhere => Vec3::ZERO,
+            Lookups::OffFootprint if footprint => Vec3::ZERO,
             Lookups::OffFootprint | Lookups::Everywhere => {
-                self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums);
+                self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums)
             }
+        };
+        if let Some(gain) = gain.filter(|_| self.at_border(branch)) {
+            self.borrow(view, arrival, gain, looked_up);
         }
     }
 
     /// The photons around the point, with a kernel of about a pixel times a factor; apart where they are in different
-    /// pictures.
+    /// pictures. Returns their radiance where all are in one.
     fn see_looked_up(
         &mut self,
         branch: &Branch,
@@ -145,18 +156,20 @@ impl EyeWalk<'_> {
         (bsdf, wider): (&Bsdf, f32),
         class: PathClass,
         sums: &mut PixelSums,
-    ) {
-        let Some(photons) = self.context.photons else { return };
+    ) -> Vec3 {
+        let Some(photons) = self.context.photons else { return Vec3::ZERO };
         let Some(language) = &self.context.plan.language else {
-            let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), |_| true);
-            self.add(class, PICTURE, branch.throughput * radiance, sums);
-            return;
+            let radiance =
+                branch.throughput * self.look_up(photons, branch, arrival, (bsdf, wider), |_| true);
+            self.add(class, PICTURE, radiance, sums);
+            return radiance;
         };
         for &pictures in language.parts(branch.trail) {
             let pick = |kind: Kind| language.pictures(branch.trail, kind) == pictures;
             let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), pick);
             self.add(class, pictures, branch.throughput * radiance, sums);
         }
+        Vec3::ZERO
     }
 
     /// Radiance by density estimation around the point, of the photons that are picked.

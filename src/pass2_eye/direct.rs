@@ -5,7 +5,8 @@ use crate::bsdf::Bsdf;
 use crate::geometry::{Ray, SurfacePoint, offset_origin};
 use crate::optics::transmittance;
 use crate::pass1_light::Source;
-use crate::sampling::{SamplePoint, cosine_hemisphere};
+use crate::plan::{Asking, LightTree};
+use crate::sampling::{SamplePoint, cosine_hemisphere, hash};
 use crate::scene::{Environment, Light, LightId, Scene, SpotLight};
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
@@ -26,6 +27,8 @@ pub(super) struct Receiver<'a> {
     pub(super) bsdf: &'a Bsdf,
     /// When it is seen: the shadow rays' time.
     pub(super) time: f32,
+    /// Which lights are asked, if not all.
+    pub(super) tree: Option<&'a LightTree>,
 }
 
 /// A direction from which light may come.
@@ -67,7 +70,7 @@ impl Receiver<'_> {
         if radiance.max_element() <= 0.0 {
             return Vec3::ZERO;
         }
-        let Receiver { scene, surface, bsdf, time } = self;
+        let Receiver { scene, surface, bsdf, time, .. } = self;
         let origin = offset_origin(surface.point, surface.error, bsdf.geometric, incident.direction);
         *rays += 1;
         let shadow_ray = Ray::new(origin, incident.direction).at_time(*time);
@@ -90,7 +93,19 @@ pub(super) fn power_heuristic(pdf: f32, other: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// Tells the radiance from each light at a D, one shadow ray each unless the scene asks for more.
+/// Lights that are picked at a D where there are too many to ask each. Measured on 1000 lamps: the error for the same time is
+/// least between two and eight.
+const PICKS: u32 = 4;
+
+/// Tells the stream that picks lights from the others.
+const PICK_STREAM: u64 = 0x11_9475;
+
+/// How often a light is asked at a D, in the mean: density of one of its points times this is that of all samples.
+pub(super) fn asked_times(tree: Option<&LightTree>, asking: &Asking, light: LightId) -> f32 {
+    tree.map_or(1.0, |tree| PICKS as f32 * tree.probability(asking, light))
+}
+
+/// Tells the radiance from each light at a D, one shadow ray each unless the scene asks for more, or from a few of many.
 pub(super) fn direct_light(
     receiver: &Receiver<'_>,
     sample: SamplePoint,
@@ -98,27 +113,58 @@ pub(super) fn direct_light(
     mut tell: impl FnMut(Source, Vec3),
 ) {
     let scene = receiver.scene;
-    for (i, light) in scene.lights.iter().enumerate() {
-        let source = Source::Light(LightId(i as u32));
-        let sample = if i == 0 { sample } else { sample.branch(i as u64) };
-        let mut strata = Strata { receiver, light, shadow_rays };
-        if let Some(radiance) = strata.radiance(sample) {
-            tell(source, radiance);
-            continue;
+    let mut ask = |id: LightId, sample: SamplePoint, times: Option<f32>| {
+        tell(Source::Light(id), from_light(receiver, (id, times), sample, shadow_rays));
+    };
+    match receiver.tree {
+        None => (0..scene.lights.len() as u32).for_each(|i| {
+            ask(LightId(i), if i == 0 { sample } else { sample.branch(u64::from(i)) }, None);
+        }),
+        Some(tree) => {
+            tree.always().iter().for_each(|&id| ask(id, sample.branch(u64::from(id.0)), None));
+            // Where there are highlights, scattered rays must know the choice from the point alone.
+            let one_sided = receiver.bsdf.albedo().is_some() && !receiver.bsdf.transmits();
+            let normal = one_sided.then_some(receiver.bsdf.geometric);
+            let asking = Asking { point: receiver.surface.point, normal };
+            let jitter = sample.branch(PICK_STREAM).get(0);
+            for pick in 0..PICKS {
+                let u = (pick as f32 + jitter) / PICKS as f32;
+                let Some((id, probability)) = tree.pick(&asking, u) else { continue };
+                let sample = sample.branch(hash(PICK_STREAM, u64::from(pick)));
+                ask(id, sample, Some(PICKS as f32 * probability));
+            }
         }
-        let incident = match light {
-            Light::Point { position, intensity } => from_point(receiver, *position, *intensity),
-            Light::Directional { direction, irradiance } => from_afar(receiver, *direction, *irradiance),
-            Light::Spot(spot) => from_spot(receiver, spot),
-            Light::Quad(quad) => from_quad(receiver, quad, sample.get_2d(2)),
-            Light::Disk(disk) => from_disk(receiver, disk, sample.get_2d(2)),
-            Light::Sphere(sphere) => from_sphere(receiver, sphere, sample.get_2d(2)),
-            Light::Mesh(mesh) => from_mesh(receiver, mesh, sample.get_2d(2)),
-        };
-        tell(source, receiver.visible(incident, shadow_rays));
     }
     let incident = from_environment(receiver, &scene.environment, sample.get_2d(4));
     tell(Source::Environment, receiver.visible(incident, shadow_rays));
+}
+
+/// Radiance from a light that is asked so many times in the mean, if not just once.
+fn from_light(
+    receiver: &Receiver<'_>,
+    (id, times): (LightId, Option<f32>),
+    sample: SamplePoint,
+    shadow_rays: &mut u64,
+) -> Vec3 {
+    let light = &receiver.scene.lights[id.index()];
+    let mut strata = Strata { receiver, light, shadow_rays };
+    if let Some(radiance) = strata.radiance(sample) {
+        return radiance;
+    }
+    let mut incident = match light {
+        Light::Point { position, intensity } => from_point(receiver, *position, *intensity),
+        Light::Directional { direction, irradiance } => from_afar(receiver, *direction, *irradiance),
+        Light::Spot(spot) => from_spot(receiver, spot),
+        Light::Quad(quad) => from_quad(receiver, quad, sample.get_2d(2)),
+        Light::Disk(disk) => from_disk(receiver, disk, sample.get_2d(2)),
+        Light::Sphere(sphere) => from_sphere(receiver, sphere, sample.get_2d(2)),
+        Light::Mesh(mesh) => from_mesh(receiver, mesh, sample.get_2d(2)),
+    };
+    if let (Some(incident), Some(times)) = (&mut incident, times) {
+        incident.irradiance /= times;
+        incident.pdf = incident.pdf.map(|pdf| pdf * times);
+    }
+    receiver.visible(incident, shadow_rays)
 }
 
 fn from_point(receiver: &Receiver<'_>, position: Vec3, intensity: Vec3) -> Option<Incident> {

@@ -16,30 +16,27 @@ const NEAR: f32 = 4.0;
 const SAME_FACE: f32 = 0.95;
 const SAME_FOLD: f32 = 0.35;
 
-/// Pixels beside one, from near to far.
+/// Pixels beside one.
 fn beside() -> impl Iterator<Item = (i32, i32)> {
-    (1..=REACH * REACH * 2).flat_map(|square| {
-        let row = move |y: i32| (-REACH..=REACH).map(move |x| (x, y));
-        (-REACH..=REACH).flat_map(row).filter(move |(x, y)| x * x + y * y == square)
-    })
+    let row = |y: i32| (-REACH..=REACH).map(move |x| (x, y));
+    (-REACH..=REACH).flat_map(row).filter(|&at| at != (0, 0))
 }
 
 impl EyeWalk<'_> {
-    /// Notes that a sample sees what a pixel beside its own shows; false if there is none.
-    pub(super) fn borrow(&mut self, view: u32, arrival: &Arrival<'_>, gain: Vec3) -> bool {
-        let Some(lender) = self.lender(view, arrival) else { return false };
+    /// Notes that a sample sees what a pixel beside its own shows, if there is one, and what was looked up there.
+    pub(super) fn borrow(&mut self, view: u32, arrival: &Arrival<'_>, gain: Vec3, looked_up: Vec3) {
+        let Some(lender) = self.lender(view, arrival) else { return };
         let borrower = self.pixel;
         let mine = self.loans.iter_mut().rev().take_while(|loan| loan.borrower == borrower);
         let half = self.half;
-        match mine.into_iter().find(|loan| loan.lender == lender) {
-            Some(loan) => loan.gain[half] += gain,
-            None => {
-                let mut loan = Loan { borrower, lender, gain: [Vec3::ZERO; 2] };
-                loan.gain[half] = gain;
-                self.loans.push(loan);
-            }
+        if let Some(loan) = mine.into_iter().find(|loan| loan.lender == lender) {
+            loan.gain[half] += gain;
+            loan.looked_up[half] += looked_up;
+            return;
         }
-        true
+        let mut loan = Loan { borrower, lender, gain: [Vec3::ZERO; 2], looked_up: [Vec3::ZERO; 2] };
+        (loan.gain[half], loan.looked_up[half]) = (gain, looked_up);
+        self.loans.push(loan);
     }
 
     fn lender(&self, view: u32, arrival: &Arrival<'_>) -> Option<u32> {
@@ -50,13 +47,17 @@ impl EyeWalk<'_> {
             return None;
         }
         let (column, row) = (self.pixel as usize % width, self.pixel as usize / width);
-        beside().find_map(|(x, y)| {
+        let distance = |index: usize| {
+            let footprint = footprints.get(index).filter(|footprint| footprint.view == view)?;
+            shows(footprint, arrival)
+        };
+        let near = beside().filter_map(|(x, y)| {
             let column = column.checked_add_signed(x as isize).filter(|&column| column < width)?;
             let row = row.checked_add_signed(y as isize).filter(|&row| row < count / width)?;
             let index = row * width + column;
-            let footprint = footprints.get(index).filter(|footprint| footprint.view == view)?;
-            shows(footprint, arrival).then_some(index as u32)
-        })
+            Some((distance(index)?, index as u32))
+        });
+        near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, index)| index)
     }
 
     /// True if the branch may see what the pixel's neighbours show: it has no footprint itself.
@@ -65,28 +66,18 @@ impl EyeWalk<'_> {
     }
 }
 
-/// True if what the ray meets is on the footprint's piece of surface, near to it.
-fn shows(footprint: &Footprint, arrival: &Arrival<'_>) -> bool {
+/// The squared distance of what the ray meets from the middle of a footprint, if it is on the same piece of surface and
+/// near.
+fn shows(footprint: &Footprint, arrival: &Arrival<'_>) -> Option<f32> {
     let surface = &arrival.hit.surface;
     let to = surface.point - footprint.center();
     let diagonal = (footprint.corners[2] - footprint.corners[0])
         .length_squared()
         .max((footprint.corners[3] - footprint.corners[1]).length_squared());
     let facing = surface.normal * -arrival.direction.dot(surface.normal).signum();
-    facing.dot(footprint.normal) >= SAME_FACE
-        && to.length_squared() <= NEAR * NEAR * diagonal
-        && to.dot(footprint.normal).abs() <= SAME_FOLD * to.length()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_nearest_pixels_come_first_and_each_once() {
-        let all: Vec<_> = beside().collect();
-        assert_eq!(all.len(), 24);
-        assert!(all[..4].iter().all(|(x, y)| x.abs() + y.abs() == 1));
-        assert!(all.windows(2).all(|w| w[0].0.pow(2) + w[0].1.pow(2) <= w[1].0.pow(2) + w[1].1.pow(2)));
-    }
+    let square = to.length_squared();
+    let same = facing.dot(footprint.normal) >= SAME_FACE
+        && square <= NEAR * NEAR * diagonal
+        && to.dot(footprint.normal).abs() <= SAME_FOLD * square.sqrt();
+    same.then_some(square)
 }

@@ -1,10 +1,31 @@
 //! The plan for what is seen, and how: colour, time, lens, the structure over the primitives, light beyond the first D.
 
-use super::Plan;
+use super::{LightTree, Plan};
 use crate::light_path::PathClass;
-use crate::scene::{Material, Paths, Scene};
+use crate::scene::{LightSampling, Material, Paths, Scene};
+
+/// Up to so many lights are each asked at every D.
+const MOST_ASKED: usize = 16;
 
 impl Plan {
+    /// All lights, or a few of them by a tree.
+    pub(super) fn decide_selection(&mut self, scene: &Scene, lit: usize) {
+        let few = lit <= MOST_ASKED;
+        if few || scene.render.light_sampling != LightSampling::Sobol {
+            let reason = match (few, lit) {
+                (_, 1) => "there is one light",
+                (true, _) => "there are few lights: each is asked",
+                (false, _) => "`light_sampling` asks for all of each light",
+            };
+            self.decide("light selection", false, "none", reason);
+            return;
+        }
+        self.light_tree = Some(LightTree::new(scene));
+        let reason =
+            format!("there are {lit} lights: a few are picked at each D by what they can give there at most");
+        self.decide("light selection", true, "a tree over the lights", reason);
+    }
+
     pub(super) fn decide_lens(&mut self, scene: &Scene) {
         match scene.camera.lens() {
             Some(_) => self.decide(

@@ -22,6 +22,7 @@ mod lab;
 mod light_images;
 mod light_sampling;
 mod lights;
+mod many_lights;
 mod materials;
 mod motion;
 mod optics;
