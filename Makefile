@@ -1,4 +1,4 @@
-.PHONY: serve test bench browser gallery openapi crash load fuzz image
+.PHONY: serve test bench browser gallery chart chart-quick openapi crash load fuzz image
 
 # Builds and starts the service on http://127.0.0.1:8080; settings as flags, e.g. `make serve ARGS="--threads 4"`.
 serve:
@@ -21,6 +21,15 @@ browser:
 # Every sample scene as a picture, and the page docs/gallery/README.md.
 gallery:
 	cargo run --release --example gallery -- $(SCENES)
+
+# Error against CPU seconds, every method, and whether renders keep the errors they promise: chart/index.html.
+CHARTED = scenes/glass-ball.json scenes/ring.json scenes/pool.json scenes/cornell.json scenes/lens.json scenes/drink.json
+chart:
+	cargo run --release --package nephroid -- chart $(CHARTED) -o chart --honesty 100
+
+# The same as a look of three minutes.
+chart-quick:
+	cargo run --release --package nephroid -- chart $(CHARTED) -o chart-quick --quick
 
 # The document of the service's addresses, after they have changed.
 openapi:

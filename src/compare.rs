@@ -1,5 +1,7 @@
 //! How far a picture is from another: error measures, the worst places, and a picture of the difference.
 
+pub mod flip;
+
 use crate::image_io::LinearImage;
 
 /// Side of a tile in pixels.

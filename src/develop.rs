@@ -8,18 +8,20 @@ use std::sync::LazyLock;
 #[must_use]
 pub fn develop(image: &LinearImage, settings: &ImageSettings) -> Vec<u8> {
     let gain = libm::exp2(f64::from(settings.exposure));
-    let encode = |x: &f32| {
-        let shown = match settings.tone {
-            Tone::Linear => f64::from(*x) * gain,
-            Tone::Filmic => filmic(f64::from(*x) * gain),
-        };
-        to_byte(shown)
-    };
-    image.pixels.iter().flatten().map(encode).collect()
+    image.pixels.iter().flatten().map(|x| to_byte(shown(*x, gain, settings.tone))).collect()
+}
+
+/// How much light the display is asked for, of which it gives 1 at most.
+pub(crate) fn shown(x: f32, gain: f64, tone: Tone) -> f64 {
+    let exposed = f64::from(x) * gain;
+    match tone {
+        Tone::Linear => exposed,
+        Tone::Filmic => tone_filmic(exposed),
+    }
 }
 
 /// The ACES-like fit of Narkowicz (2015), which maps 0..∞ to 0..1.
-fn filmic(x: f64) -> f64 {
+pub(crate) fn tone_filmic(x: f64) -> f64 {
     // Above this the curve is flat, and the squares below may overflow.
     let x = x.clamp(0.0, 1e6);
     (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)

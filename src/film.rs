@@ -305,6 +305,12 @@ impl Film {
         self.map(|means| means.class(class))
     }
 
+    /// All classes together in one of the two halves, as they were gathered.
+    #[must_use]
+    pub fn raw_half(&self, half: usize) -> LinearImage {
+        self.map(|means| means.halves[half].total())
+    }
+
     fn map(&self, value: impl Fn(&PixelMeans) -> Vec3) -> LinearImage {
         let pixels = self.means().map(|means| value(&means).to_array()).collect();
         LinearImage { width: self.width, height: self.height, pixels }

@@ -52,7 +52,7 @@
 //! mirror and glass · [`media`] what a ray is inside of · [`spectrum`] wavelengths · [`bsdf`] scattering · [`sampling`] random and low-discrepancy numbers · [`plan`] what runs and why · [`render`] the
 //! method on one screen · [`pass1_light`] `LS+D` · [`photon_map`] the kd-tree · [`radius`] how wide to look ·
 //! [`pass2_eye`] `…E` · [`film`] layers and their error · [`develop`], [`image_io`] pictures · [`import`] models in glTF · [`compare`]
-//! how two differ · [`report`] plans and statistics as JSON.
+//! how two differ · [`lab`] error against time, charted · [`report`] plans and statistics as JSON.
 
 pub mod bsdf;
 pub mod compare;
@@ -62,6 +62,7 @@ pub mod film;
 pub mod geometry;
 pub mod image_io;
 pub mod import;
+pub mod lab;
 pub mod light_path;
 pub mod media;
 pub mod optics;

@@ -24,7 +24,7 @@ mod photons;
 pub use checkpoint::CheckpointError;
 pub use control::Control;
 
-use milestone::is_milestone;
+pub(crate) use milestone::is_milestone;
 
 /// Why a round did not finish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -345,6 +345,12 @@ impl Render {
     #[must_use]
     pub fn raw_layer(&self, class: PathClass) -> LinearImage {
         self.film.raw_layer(class)
+    }
+
+    /// Everything as it was gathered by the two halves, which share no random number.
+    #[must_use]
+    pub fn raw_halves(&self) -> [LinearImage; 2] {
+        [0, 1].map(|half| self.film.raw_half(half))
     }
 
     /// The scene that is rendered.

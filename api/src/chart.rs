@@ -1,6 +1,7 @@
 //! The estimated error of a render against its time, as SVG: both axes logarithmic, so that power laws are straight.
 
 use crate::jobs::Milestone;
+use nephroid::lab::axis::{LogAxis, escaped, plain};
 use std::fmt::Write;
 
 const WIDTH: f64 = 640.0;
@@ -39,8 +40,8 @@ pub(crate) fn draw(name: &str, history: &[Milestone]) -> String {
 fn plot(svg: &mut String, points: &[(f64, f64)]) {
     let [left, right, top, bottom] = BOX;
     let (x, y) = (
-        Axis::around(points.iter().map(|p| p.0), left, right),
-        Axis::around(points.iter().map(|p| p.1), bottom, top),
+        LogAxis::around(points.iter().map(|p| p.0), left, right),
+        LogAxis::around(points.iter().map(|p| p.1), bottom, top),
     );
     for tick in x.ticks() {
         line(svg, (x.at(tick), top), (x.at(tick), bottom));
@@ -67,47 +68,6 @@ fn plot(svg: &mut String, points: &[(f64, f64)]) {
     }
 }
 
-/// A logarithmic axis between two places of the picture.
-struct Axis {
-    low: f64,
-    high: f64,
-    from: f64,
-    to: f64,
-}
-
-impl Axis {
-    /// Holds all values, and more than one of the ticks.
-    fn around(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
-        let low = values.clone().fold(f64::INFINITY, f64::min) / 1.15;
-        let high = values.fold(0.0, f64::max) * 1.15;
-        let grow = (4.0 * low / high).max(1.0).sqrt();
-        Self { low: low / grow, high: high * grow, from, to }
-    }
-
-    fn at(&self, value: f64) -> f64 {
-        self.from + (self.to - self.from) * (value / self.low).ln() / (self.high / self.low).ln()
-    }
-
-    /// 1, 2 and 5 times powers of ten; powers of ten alone where those would be too many.
-    fn ticks(&self) -> Vec<f64> {
-        let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
-        let all = |steps: &'static [f64]| -> Vec<f64> {
-            let values =
-                decades.clone().flat_map(|decade| steps.iter().map(move |step| step * 10_f64.powi(decade)));
-            values.filter(|value| (self.low..=self.high).contains(value)).collect()
-        };
-        let fine = all(&[1.0, 2.0, 5.0]);
-        if fine.len() <= 8 { fine } else { all(&[1.0]) }
-    }
-}
-
-/// A number with as few digits as it has.
-fn plain(value: f64) -> String {
-    let decimals = (1 - value.log10().floor() as i32).clamp(0, 6) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
 fn line(svg: &mut String, from: (f64, f64), to: (f64, f64)) {
     let _ = writeln!(
         svg,
@@ -118,22 +78,6 @@ fn line(svg: &mut String, from: (f64, f64), to: (f64, f64)) {
 
 fn text(svg: &mut String, (x, y): (f64, f64), anchor: &str, words: &str) {
     let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>");
-}
-
-fn escaped(text: &str) -> String {
-    let mut escaped = String::new();
-    for c in text.chars() {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            // XML knows no other control characters, escaped or not.
-            c if c.is_control() && !matches!(c, '\t' | '\n' | '\r') => {}
-            c => escaped.push(c),
-        }
-    }
-    escaped
 }
 
 #[cfg(test)]
@@ -159,10 +103,5 @@ mod tests {
         assert!(points.is_sorted_by(|a, b| a[0] < b[0] && a[1] < b[1]), "{points:?}");
         assert!(points.iter().all(|p| p[0] > BOX[0] && p[0] < BOX[1] && p[1] > BOX[2] && p[1] < BOX[3]));
         assert!(svg.contains(">1 s<") && svg.contains(">10 %<"), "{svg}");
-    }
-
-    #[test]
-    fn numbers_have_no_digits_too_many() {
-        assert_eq!([0.05, 0.2, 1.0, 20.0, 500.0].map(plain), ["0.05", "0.2", "1", "20", "500"]);
     }
 }

@@ -3,7 +3,8 @@
 use super::Failure;
 use super::files::{cannot, load_image, save_image, say};
 use clap::Args;
-use nephroid::compare::{Comparison, compare};
+use nephroid::compare::flip::{hdr_flip, ldr_flip};
+use nephroid::compare::{CompareError, Comparison, compare};
 use nephroid::image_io::{self, LinearImage};
 use nephroid::scene::{ImageSettings, Tone};
 use serde_json::json;
@@ -46,12 +47,31 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.difference {
         save_image(path, &comparison.difference, &plain(&comparison.difference))?;
     }
+    let flip = if mask.is_none() { Some(Flips::of(&test, &reference)?) } else { None };
     if arguments.json {
-        say(to_json(&comparison));
+        say(to_json(&comparison, flip.as_ref()));
     } else {
         print(&comparison);
+        if let Some(flip) = flip {
+            say(format!("LDR-FLIP         {:.6}   as a display shows them, clipped at 1", flip.ldr));
+            say(format!("HDR-FLIP         {:.6}   the largest over all useful exposures", flip.hdr));
+        }
     }
     Ok(())
+}
+
+/// Perceived differences, 0 to 1; none with a mask, since what is seen of a pixel depends on those around it.
+struct Flips {
+    ldr: f64,
+    hdr: f64,
+}
+
+impl Flips {
+    fn of(test: &LinearImage, reference: &LinearImage) -> Result<Self, Failure> {
+        let wrong = |e: CompareError| Failure::Usage(e.to_string());
+        let ldr = ldr_flip(test, reference, &plain(reference)).map_err(wrong)?.mean;
+        Ok(Self { ldr, hdr: hdr_flip(test, reference).map_err(wrong)?.mean })
+    }
 }
 
 /// Neither exposed nor tone-mapped.
@@ -59,7 +79,7 @@ fn plain(image: &LinearImage) -> ImageSettings {
     ImageSettings { width: image.width, height: image.height, exposure: 0.0, tone: Tone::Linear }
 }
 
-fn to_json(c: &Comparison) -> serde_json::Value {
+fn to_json(c: &Comparison, flip: Option<&Flips>) -> serde_json::Value {
     let tiles: Vec<_> = c
         .worst_tiles
         .iter()
@@ -68,6 +88,7 @@ fn to_json(c: &Comparison) -> serde_json::Value {
     json!({
         "pixels": c.pixels, "rmse": c.rmse, "rel_rmse": c.rel_rmse, "relmse": c.relmse,
         "mean_ratio": c.mean_ratio, "channel_mean_ratio": c.channel_mean_ratio, "worst_tiles": tiles,
+        "ldr_flip": flip.map(|f| f.ldr), "hdr_flip": flip.map(|f| f.hdr),
     })
 }
 

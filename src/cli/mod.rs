@@ -1,5 +1,6 @@
 //! The command line: what was typed, and the failures that become exit codes.
 
+mod chart;
 mod check;
 mod compare;
 mod convert;
@@ -31,6 +32,8 @@ enum Command {
     Check(check::CheckArguments),
     /// Measure how one picture differs from another.
     Compare(compare::CompareArguments),
+    /// Chart the error of every method against its CPU time.
+    Chart(chart::ChartArguments),
     /// Turn a model in binary glTF into a scene file.
     Convert(convert::ConvertArguments),
     /// Print the JSON Schema of scene files.
@@ -44,6 +47,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Chart(arguments) => chart::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Schema(arguments) => schema::run(&arguments),
     }
@@ -80,6 +84,9 @@ pub(crate) enum Failure {
     /// The render failed.
     #[error("{0}")]
     Render(#[from] nephroid::render::RenderError),
+    /// A scene cannot be charted.
+    #[error("{0}")]
+    Lab(nephroid::lab::LabError),
 }
 
 impl Failure {
@@ -87,7 +94,7 @@ impl Failure {
         match self {
             Self::Scene { .. } | Self::Model { .. } => 1,
             Self::Usage(_) => 2,
-            Self::Cancelled { .. } | Self::Render(_) => 3,
+            Self::Cancelled { .. } | Self::Render(_) | Self::Lab(_) => 3,
         }
     }
 }

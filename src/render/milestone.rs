@@ -12,7 +12,7 @@ use crate::sampling::hash;
 
 /// True for 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, …: at these numbers of rounds the error is estimated and the
 /// render may stop by it. Between them the picture gains too little to be worth the estimate.
-pub(super) fn is_milestone(rounds: u32) -> bool {
+pub(crate) fn is_milestone(rounds: u32) -> bool {
     rounds.is_power_of_two() || (rounds.is_multiple_of(3) && (rounds / 3).is_power_of_two())
 }
 

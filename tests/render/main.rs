@@ -18,6 +18,7 @@ mod geometry_structures;
 mod glb;
 mod import;
 mod invariance;
+mod lab;
 mod light_images;
 mod light_sampling;
 mod lights;

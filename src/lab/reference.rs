@@ -1,0 +1,116 @@
+//! What the methods should come to: a long render by an unbiased estimator, with its own standard error.
+
+use super::methods::all_can_be_met;
+use super::run::Timed;
+use super::{Budget, LabError, Subject, Task};
+use crate::compare::{Comparison, compare};
+use crate::image_io::LinearImage;
+use crate::plan::Plan;
+use crate::scene::Caustics;
+use serde_json::{Value, json};
+
+/// Seed of the reference.
+const SEED: u64 = 0x5ee_dbee;
+
+/// Each estimator is tried for this part of the budget; the better one goes on.
+const TRIAL: f64 = 0.125;
+
+/// A picture to measure errors against.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference {
+    /// Mean of the two halves, nothing smoothed.
+    pub image: LinearImage,
+    /// Its standard error: root mean square of half the halves' difference, over the mean.
+    pub error: f64,
+    /// The same where each pixel counts relative to itself, as the renderer's own estimate does: root of the mean of
+    /// (A - B)²/4 / (r² + (0.1 mean)²).
+    pub relative_error: f64,
+    /// What made it.
+    pub estimator: String,
+    /// Rounds it took.
+    pub rounds: u32,
+    /// CPU seconds it took.
+    pub cpu: f64,
+    /// The estimator that was tried beside it.
+    pub rival: Option<Rival>,
+}
+
+/// An independent estimate of the same picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rival {
+    /// What made it.
+    pub estimator: String,
+    /// Its standard error.
+    pub error: f64,
+    /// Its difference from the reference, as root mean square over the mean: not more than both errors together, if both
+    /// are right.
+    pub difference: f64,
+    /// Its mean over that of the reference.
+    pub mean_ratio: f64,
+}
+
+/// Renders a reference within the budget.
+///
+/// # Errors
+/// If the scene cannot be rendered, or is black.
+pub fn measure_reference(subject: &Subject<'_>, task: Task, budget: Budget) -> Result<Reference, LabError> {
+    let mut trials = Vec::new();
+    for (name, settings) in estimators(subject, task)? {
+        let mut timed = Timed::new(subject.scene(&settings, SEED)?);
+        run(&mut timed, TRIAL * budget.reference)?;
+        trials.push((name, summary(&timed)?, timed));
+    }
+    trials.sort_by(|a, b| a.1.error.total_cmp(&b.1.error));
+    let mut trials = trials.into_iter();
+    let Some((name, _, mut timed)) = trials.next() else { return Err(LabError::NotAnObject) };
+    run(&mut timed, budget.reference)?;
+    let mut reference = Reference { estimator: name, ..summary(&timed)? };
+    if let Some((name, other, _)) = trials.next() {
+        let against = compare(&other.image, &reference.image, None)?;
+        reference.rival = Some(Rival {
+            estimator: name,
+            error: other.error,
+            difference: against.rel_rmse,
+            mean_ratio: against.mean_ratio,
+        });
+    }
+    Ok(reference)
+}
+
+/// Estimators without bias, and what asks for them.
+fn estimators(subject: &Subject<'_>, task: Task) -> Result<Vec<(String, Value)>, LabError> {
+    if task == Task::DirectLight {
+        return Ok(vec![("eye samples".to_owned(), json!({ "paths": "whitted" }))]);
+    }
+    let mut found = vec![("photons on pixels, not smoothed".to_owned(), json!({}))];
+    let scene = subject.scene(&json!({}), SEED)?;
+    if all_can_be_met(&scene) && Plan::new(&scene).caustics == Some(Caustics::Photons) {
+        found.push(("backward paths".to_owned(), json!({ "caustics": "backward" })));
+    }
+    Ok(found)
+}
+
+fn run(timed: &mut Timed, seconds: f64) -> Result<(), LabError> {
+    while timed.cpu < seconds || timed.render.rounds() < 2 {
+        timed.run_to_milestone()?;
+    }
+    Ok(())
+}
+
+fn summary(timed: &Timed) -> Result<Reference, LabError> {
+    let [a, b] = timed.render.raw_halves();
+    let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
+    let pixels = a.pixels.iter().zip(&b.pixels).map(mean).collect();
+    let image = LinearImage { width: a.width, height: a.height, pixels };
+    // The mean differs from a half by half the halves' difference.
+    let Comparison { rel_rmse, relmse, .. } = compare(&a, &image, None)?;
+    Ok(Reference {
+        image,
+        error: rel_rmse,
+        relative_error: relmse.sqrt(),
+        estimator: String::new(),
+        rounds: timed.render.rounds(),
+        cpu: timed.cpu,
+        rival: None,
+    })
+}
