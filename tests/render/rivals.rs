@@ -173,7 +173,7 @@ fn photons_sent_everywhere_bring_the_same_light() {
             estimate("photons", &value, PathClass::Caustic, Cost { rounds: 1, log2_photons })
         });
         let error = aimed.standard_error.hypot(all.standard_error);
-        assert!(T_LIMIT * error < 0.1 * aimed.mean, "too noisy to tell: {aimed:?} {all:?}");
+        assert!(T_LIMIT * error < 0.2 * aimed.mean, "too noisy to tell: {aimed:?} {all:?}");
         assert!((aimed.mean - all.mean).abs() <= T_LIMIT * error, "{aimed:?} {all:?}");
     }
 }
