@@ -2,14 +2,13 @@
 
 use crate::jobs::Milestone;
 use nephroid::lab::axis::{LogAxis, escaped, plain};
+use nephroid::lab::svg::{INK, line, text};
 use std::fmt::Write;
 
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 400.0;
 /// Left, right, top and bottom of the plot.
 const BOX: [f64; 4] = [72.0, 620.0, 56.0, 340.0];
-const INK: &str = "#1d2126";
-const GRID: &str = "#d8d3c8";
 const LINE: &str = "#b25a00";
 
 /// Draws the history of the render of this name. Colours are attributes, so that no policy forbids them.
@@ -66,18 +65,6 @@ fn plot(svg: &mut String, points: &[(f64, f64)]) {
             y.at(p.1)
         );
     }
-}
-
-fn line(svg: &mut String, from: (f64, f64), to: (f64, f64)) {
-    let _ = writeln!(
-        svg,
-        "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{GRID}\"/>",
-        from.0, from.1, to.0, to.1
-    );
-}
-
-fn text(svg: &mut String, (x, y): (f64, f64), anchor: &str, words: &str) {
-    let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>");
 }
 
 #[cfg(test)]

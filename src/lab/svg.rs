@@ -9,8 +9,10 @@ const WIDTH: f64 = 980.0;
 const HEIGHT: f64 = 520.0;
 /// Left, right, top and bottom of the plot; the legend stands to the right.
 const BOX: [f64; 4] = [76.0, 640.0, 56.0, 456.0];
-const INK: &str = "#1d2126";
-const GRID: &str = "#d8d3c8";
+/// Colour of words and axes.
+pub const INK: &str = "#1d2126";
+/// Colour of the lines at the ticks.
+pub const GRID: &str = "#d8d3c8";
 /// Colours that stay apart for most eyes (Okabe and Ito), the default first.
 const COLOURS: [&str; 8] =
     ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9", "#000000", "#7a7f87"];
@@ -39,8 +41,8 @@ pub fn draw(chart: &Chart) -> String {
         for (index, curve) in chart.curves.iter().enumerate() {
             draw_curve(&mut svg, curve, COLOURS[index % COLOURS.len()], (&x, &y));
         }
-        legend(&mut svg, &chart.curves);
     }
+    legend(&mut svg, &chart.curves);
     svg.push_str("</svg>\n");
     svg
 }
@@ -100,7 +102,8 @@ fn legend(svg: &mut String, curves: &[Curve]) {
     }
 }
 
-fn line(svg: &mut String, from: (f64, f64), to: (f64, f64)) {
+/// A line of the grid.
+pub fn line(svg: &mut String, from: (f64, f64), to: (f64, f64)) {
     let _ = writeln!(
         svg,
         "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{GRID}\"/>",
@@ -108,6 +111,7 @@ fn line(svg: &mut String, from: (f64, f64), to: (f64, f64)) {
     );
 }
 
-fn text(svg: &mut String, (x, y): (f64, f64), anchor: &str, words: &str) {
+/// Words, escaped already.
+pub fn text(svg: &mut String, (x, y): (f64, f64), anchor: &str, words: &str) {
     let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>");
 }

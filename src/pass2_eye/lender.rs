@@ -42,8 +42,10 @@ impl EyeWalk<'_> {
     fn lender(&self, view: u32, arrival: &Arrival<'_>) -> Option<u32> {
         let footprints = self.context.footprints;
         let (count, width) = footprints.size();
-        // What moves is not always where it is now, and named layers take apart what a loan holds together.
-        if count == 0 || self.context.plan.moves || self.context.plan.language.is_some() {
+        let (plan, lens) = (self.context.plan, self.context.scene.camera.lens());
+        // Through a lens no pixel has a footprint; what moves is not always where it is now; and named layers take apart
+        // what a loan holds together.
+        if count == 0 || lens.is_some() || plan.moves || plan.language.is_some() {
             return None;
         }
         let (column, row) = (self.pixel as usize % width, self.pixel as usize / width);

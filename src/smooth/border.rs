@@ -44,7 +44,7 @@ pub struct Borrower {
     pub coverage: Vec3,
 }
 
-/// A pixel that may borrow.
+/// A pixel that borrows, before the bias is known.
 #[derive(Clone, Copy)]
 struct Border {
     borrower: Borrower,
@@ -69,14 +69,14 @@ pub(super) fn borrowers(film: &Film, samples: &[Sample], lent: &[Lent], floor: f
     };
     let bias = plane(&|border| border.bias);
     let counts = plane(&|_| 1.0);
-    let choose = |border: &Border| {
+    let with_bias = |border: &Border| {
         let mut borrower = border.borrower;
         let at = (borrower.pixel as usize % size.0, borrower.pixel as usize / size.0);
         let around = bias.around(at, WINDOW);
         borrower.squared_error += (around / counts.around(at, WINDOW)).max(0.0) as f32 / border.weight;
         borrower
     };
-    borders.iter().filter(|border| border.weight > 0.0).map(choose).collect()
+    borders.iter().filter(|border| border.weight > 0.0).map(with_bias).collect()
 }
 
 impl Border {
