@@ -4,7 +4,7 @@ use super::{Film, PixelSums, RoundFilm};
 use crate::image_io::LinearImage;
 use glam::{DVec3, Vec3};
 
-/// What both halves of a pixel have gathered for one named layer; sums as in [`HalfSums`].
+/// What both halves of a pixel have gathered for one named layer; sums as in [`HalfSums`](super::HalfSums).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LayerSums {
     /// Radiance that eye samples bring.

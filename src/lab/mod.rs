@@ -1,7 +1,7 @@
 //! The lab: every method that can render a scene, its error against a reference over CPU seconds.
 //!
 //! A [`Subject`] is a scene that is rendered by many [`methods`]; its [`Reference`] is what they should come to. A
-//! [`Chart`] holds one [`Curve`] per method; [`svg`] draws it, [`page`] and [`table`] write it down. [`honesty`] asks
+//! [`Chart`] holds one [`Curve`] per method; [`svg`] draws it, [`page`] and [`table`] write it down. [`honesty()`] asks
 //! whether renders that stop by their own estimate are as good as they say.
 
 pub mod axis;
