@@ -139,7 +139,7 @@ pub struct Settings {
     /// Bytes that stay free on the disk: with less, new jobs are refused
     #[arg(long, env = "NEPHROID_MIN_FREE", default_value = "256M", value_parser = parse_bytes)]
     pub min_free: usize,
-    /// Origins whose pages may use the service, such as https://example.org; several are separated by commas
+    /// Origins whose pages may use the service, such as `https://example.org`; several are separated by commas
     #[arg(long, env = "NEPHROID_CORS_ORIGIN", value_delimiter = ',', value_parser = parse_origin)]
     pub cors_origin: Vec<HeaderValue>,
     /// Serve without a key whoever comes; without this flag keys are asked for as soon as one was made, and
