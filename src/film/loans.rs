@@ -3,7 +3,7 @@
 //! A pixel that shows parts of several surfaces has no footprint of its own to count photons on: they are looked up around
 //! its eye samples. But each of these lands on a surface that some pixel beside it shows whole, whose irradiance, counted
 //! on a footprint and smoothed, is less noisy, at the price of its being taken from a pixel or two aside. Both are kept:
-//! the picture is borrowed, the raw layers are looked up.
+//! the smoothing chooses.
 
 use glam::Vec3;
 

@@ -1,17 +1,24 @@
-//! Pixels at borders: what the pixels beside them lend takes the place of what was looked up around their eye samples.
+//! Pixels at borders: what was looked up around their eye samples, or what the pixels beside them lend.
 //!
 //! A look-up holds a handful of photons; what is lent is smoothed, but lies a pixel or two aside. With L what was looked up
-//! and b what is borrowed, the halves of the film estimate the squared bias of borrowing, (L_A - b_A)(L_B - b_B), without
-//! bias: it is part of the error. To choose by it, pixel by pixel, was tried: looking up is then chosen where both halves
-//! hold a spike, and the picture gets brighter.
+//! and b what is borrowed, the halves of the film estimate the squared bias of borrowing, (L_A - b_A)(L_B - b_B), and the
+//! noise of looking up, (L_A - L_B)²/4, both without bias. A pixel borrows until the bias stands out from the noise beyond
+//! doubt: where photons are few, a spike in both halves looks like bias and not like noise, and to look up then would make
+//! the picture brighter. For the same reason the noise is taken to be at least that of the lender's own few photons.
 
 use super::ladder::Sums;
 use super::{Sample, mean_channel};
 use crate::film::{Film, Loan};
 use glam::Vec3;
 
-/// Half width of the window over which the bias is averaged, in pixels.
+/// Half width of the window over which both are averaged, in pixels.
 const WINDOW: usize = 8;
+
+/// Looking up must have a squared error so many times less,
+const CLEARLY: f64 = 2.0;
+
+/// and the bias must be so many standard errors that mere noise would give it.
+const SURE: f64 = 3.0;
 
 /// What a pixel's irradiance is to those that borrow it.
 pub(super) struct Lent {
@@ -44,17 +51,18 @@ pub struct Borrower {
     pub coverage: Vec3,
 }
 
-/// A pixel that borrows, before the bias is known.
+/// A pixel that may borrow.
 #[derive(Clone, Copy)]
 struct Border {
     borrower: Borrower,
-    /// Weighted squared bias.
+    /// Weighted squared bias and noise.
     bias: f32,
+    noise: f32,
     /// One over the squared radiance that errors are relative to.
     weight: f32,
 }
 
-/// The pixels that borrow, in their order.
+/// The pixels that do better to borrow, in their order.
 pub(super) fn borrowers(film: &Film, samples: &[Sample], lent: &[Lent], floor: f32) -> Vec<Borrower> {
     let borders: Vec<Border> = film
         .loans()
@@ -68,15 +76,20 @@ pub(super) fn borrowers(film: &Film, samples: &[Sample], lent: &[Lent], floor: f
         Sums::new(size, plane.into_iter())
     };
     let bias = plane(&|border| border.bias);
+    let noise = plane(&|border| border.noise);
+    // The variance of a product of two halves without bias, whose own variances are twice that of their mean.
+    let spread = plane(&|border| (2.0 * border.noise).powi(2));
     let counts = plane(&|_| 1.0);
-    let with_bias = |border: &Border| {
+    let choose = |border: &Border| {
         let mut borrower = border.borrower;
         let at = (borrower.pixel as usize % size.0, borrower.pixel as usize / size.0);
         let around = bias.around(at, WINDOW);
         borrower.squared_error += (around / counts.around(at, WINDOW)).max(0.0) as f32 / border.weight;
-        borrower
+        let biased = around > CLEARLY * noise.around(at, WINDOW)
+            && around > SURE * spread.around(at, WINDOW).max(0.0).sqrt();
+        (!biased).then_some(borrower)
     };
-    borders.iter().filter(|border| border.weight > 0.0).map(with_bias).collect()
+    borders.iter().filter(|border| border.weight > 0.0).filter_map(choose).collect()
 }
 
 impl Border {
@@ -84,7 +97,7 @@ impl Border {
         let pixel = loans[0].borrower;
         let (mut looked_up, mut borrowed) = ([Vec3::ZERO; 2], [Vec3::ZERO; 2]);
         let (mut smooth, mut coverage) = (Vec3::ZERO, Vec3::ZERO);
-        let mut squared_error = 0.0;
+        let (mut squared_error, mut least_noise) = (0.0, 0.0);
         for loan in loans {
             let (gain, found) = (film.gain(loan), film.looked_up(loan));
             let (sample, lent) = (&samples[loan.lender as usize], &lent[loan.lender as usize]);
@@ -97,13 +110,15 @@ impl Border {
             smooth += mean_gain * irradiance;
             coverage += 0.5 * (gain[0] - gain[1]) * irradiance;
             squared_error += lent.squared_error * mean_channel(mean_gain * mean_gain);
+            least_noise += Lent::raw(sample).squared_error * mean_channel(mean_gain * mean_gain);
         }
         let radiance = mean_channel(samples[pixel as usize].rest) + floor;
         let weight = if radiance > 0.0 { radiance.powi(-2) } else { 0.0 };
         let replaced = 0.5 * (looked_up[0] - looked_up[1]);
         let bias = mean_channel((looked_up[0] - borrowed[0]) * (looked_up[1] - borrowed[1])) * weight;
+        let noise = mean_channel(replaced * replaced).max(least_noise) * weight;
         let correction = smooth - 0.5 * (looked_up[0] + looked_up[1]);
         let borrower = Borrower { pixel, correction, squared_error, replaced, coverage };
-        Self { borrower, bias, weight }
+        Self { borrower, bias, noise, weight }
     }
 }
