@@ -2,10 +2,8 @@
 
 mod bytes;
 mod layers;
-mod loans;
 
 pub use layers::LayerSums;
-pub use loans::Loan;
 
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
@@ -154,7 +152,6 @@ impl PixelSums {
 pub struct RoundFilm {
     width: u32,
     pixels: Vec<PixelSums>,
-    loans: Vec<Loan>,
     /// As in [`Film`].
     layers: Vec<LayerSums>,
 }
@@ -165,12 +162,7 @@ impl RoundFilm {
         let count = width as usize * height as usize;
         let (pixels, layers) =
             (vec![PixelSums::default(); count], vec![LayerSums::default(); count * layers]);
-        Self { width, pixels, loans: Vec::new(), layers }
-    }
-
-    /// Adds what a tile's pixels borrow.
-    pub(crate) fn lend(&mut self, loans: &[Loan]) {
-        self.loans.extend_from_slice(loans);
+        Self { width, pixels, layers }
     }
 
     /// Puts a tile's pixels, row by row, at (x, y).
@@ -201,8 +193,6 @@ pub struct Film {
     /// Sum of the rounds' photon weights.
     photon_weight: f32,
     pixels: Vec<PixelSums>,
-    /// What pixels at borders borrow, in the order of borrowers and lenders.
-    loans: Vec<Loan>,
     /// The named layers of each pixel, one pixel after the other.
     layers: Vec<LayerSums>,
 }
@@ -214,8 +204,7 @@ impl Film {
         let count = width as usize * height as usize;
         let (pixels, layers) =
             (vec![PixelSums::default(); count], vec![LayerSums::default(); count * layers]);
-        let loans = Vec::new();
-        Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels, loans, layers }
+        Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels, layers }
     }
 
     /// Bytes a film of this size holds.
@@ -237,10 +226,6 @@ impl Film {
 
     fn add(&mut self, mut round: RoundFilm, photon_weight: f32) {
         self.photon_weight += photon_weight;
-        for loan in &mut round.loans {
-            loan.looked_up = loan.looked_up.map(|radiance| radiance * photon_weight);
-        }
-        Loan::merge(&mut self.loans, &round.loans);
         for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
             pixel.weigh_photons(photon_weight, self.caustics);
             sum.add(pixel);
@@ -253,26 +238,6 @@ impl Film {
     /// Means of every pixel, row by row.
     pub fn means(&self) -> impl Iterator<Item = PixelMeans> + '_ {
         self.pixels.iter().map(|pixel| pixel.means(self.photon_weight, self.caustics))
-    }
-
-    /// The borrower's mean radiance per irradiance of the lender's footprint, in each half.
-    #[must_use]
-    pub fn gain(&self, loan: &Loan) -> [Vec3; 2] {
-        let per_sample = 1.0 / self.pixels[loan.borrower as usize].samples.max(1) as f32;
-        loan.gain.map(|gain| gain * per_sample)
-    }
-
-    /// What look-ups found in place of a loan: mean radiance of each half.
-    #[must_use]
-    pub fn looked_up(&self, loan: &Loan) -> [Vec3; 2] {
-        let per_photon = if self.photon_weight > 0.0 { 1.0 / self.photon_weight } else { 0.0 };
-        loan.looked_up.map(|radiance| radiance * per_photon)
-    }
-
-    /// What pixels at borders may borrow.
-    #[must_use]
-    pub fn loans(&self) -> &[Loan] {
-        &self.loans
     }
 
     /// The estimator of the caustics.

@@ -117,11 +117,6 @@ impl<'a> Picture<'a> {
         if smoothed.is_some() {
             photons -= means.gain * 0.5 * (means.irradiance[0] - means.irradiance[1]);
         }
-        if let Some(borrower) = self.smoothing.as_ref().and_then(|s| s.borrower(index)) {
-            // What is borrowed differs by where the eye samples fell; what was looked up is no more in the picture.
-            sampled += borrower.coverage;
-            photons -= borrower.replaced;
-        }
         let photons = photons * photons + Vec3::splat(smoothed.unwrap_or(0.0));
         PixelError {
             sampled: mean_channel(sampled * sampled / scale),

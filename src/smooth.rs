@@ -9,15 +9,11 @@
 //!
 //! The main way of the eye through mirrors and glass is smoothed only; its fainter branches stay as they are.
 
-mod border;
 mod ladder;
 mod segment;
 
-pub use border::Borrower;
-
 use crate::film::{Film, PixelMeans};
 use crate::pass2_eye::Footprints;
-use border::Lent;
 use glam::Vec3;
 use ladder::Ladder;
 use rayon::prelude::*;
@@ -33,17 +29,6 @@ pub struct Smoothing {
     pub squared_error: Vec<Option<f32>>,
     /// The width chosen for each pixel; 0 where it stays as it was gathered.
     level: Vec<u8>,
-    /// Pixels at borders that take what the pixels beside them show, in their order.
-    borrowers: Vec<Borrower>,
-}
-
-impl Smoothing {
-    /// What a pixel borrows, if it does.
-    #[must_use]
-    pub fn borrower(&self, pixel: usize) -> Option<&Borrower> {
-        let at = self.borrowers.binary_search_by_key(&(pixel as u32), |borrower| borrower.pixel);
-        at.ok().map(|i| &self.borrowers[i])
-    }
 }
 
 /// Segments with fewer pixels tell too little about noise and blur.
@@ -77,27 +62,19 @@ pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
         .collect();
     let mut correction = vec![Vec3::ZERO; samples.len()];
     let mut squared_error = vec![None; samples.len()];
-    let mut lent: Vec<Lent> = samples.iter().map(Lent::raw).collect();
     let mut level = vec![0; samples.len()];
     for (segment, ladder) in &filtered {
         for &pixel in &segment.pixels {
             let sample = &samples[pixel as usize];
             let choice = ladder.choice(segment.local(pixel));
             let raw = 0.5 * (sample.irradiance[0] + sample.irradiance[1]);
-            let change = choice.irradiance - raw;
-            correction[pixel as usize] = sample.gain * change;
+            correction[pixel as usize] = sample.gain * (choice.irradiance - raw);
             squared_error[pixel as usize] =
                 Some(choice.squared_error * mean_channel(sample.gain * sample.gain));
             level[pixel as usize] = choice.level;
-            lent[pixel as usize] = Lent { change, squared_error: choice.squared_error };
         }
     }
-    let borrowers = border::borrowers(film, &samples, &lent, 0.1 * mean);
-    for borrower in &borrowers {
-        correction[borrower.pixel as usize] = borrower.correction;
-        squared_error[borrower.pixel as usize] = Some(borrower.squared_error);
-    }
-    Some(Smoothing { correction, squared_error, level, borrowers })
+    Some(Smoothing { correction, squared_error, level })
 }
 
 /// What the same widths add to a part of the irradiance, per pixel: radiance. What they add to all parts is the whole's

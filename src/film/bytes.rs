@@ -1,6 +1,6 @@
 //! The film as bytes, for checkpoints.
 
-use super::{Film, LayerSums, Loan, PixelSums};
+use super::{Film, LayerSums, PixelSums};
 use glam::Vec3;
 
 impl Film {
@@ -16,9 +16,6 @@ impl Film {
         for layer in &self.layers {
             layer.to_array().into_iter().for_each(|value| bytes.extend(value.to_le_bytes()));
         }
-        for loan in &self.loans {
-            loan.words().for_each(|word| bytes.extend(word.to_le_bytes()));
-        }
         bytes
     }
 
@@ -28,9 +25,10 @@ impl Film {
         let mut film = Self { rounds: 0, photon_weight: 0.0, ..self.clone() };
         let (rounds, rest) = bytes.split_first_chunk::<4>()?;
         let (photon_weight, values) = rest.split_first_chunk::<4>()?;
-        let (pixels, rest) = values.split_at_checked(film.pixels.len() * PixelSums::WORDS * 4)?;
-        let (layers, loans) = rest.split_at_checked(film.layers.len() * LayerSums::BYTES as usize)?;
-        let (loans, []) = loans.as_chunks::<{ Loan::BYTES }>() else { return None };
+        let (pixels, layers) = values.split_at_checked(film.pixels.len() * PixelSums::WORDS * 4)?;
+        if layers.len() != film.layers.len() * LayerSums::BYTES as usize {
+            return None;
+        }
         film.rounds = u32::from_le_bytes(*rounds);
         film.photon_weight = f32::from_le_bytes(*photon_weight);
         let mut words = pixels.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
@@ -40,16 +38,6 @@ impl Film {
         let mut numbers = layers.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
         for layer in &mut film.layers {
             *layer = LayerSums::from_array(std::array::from_fn(|_| numbers.next().unwrap_or(0.0)));
-        }
-        film.loans.clear();
-        for bytes in loans {
-            let mut words = bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b));
-            let loan = Loan::from_words(|| words.next().unwrap_or(0));
-            let known = |pixel: u32| (pixel as usize) < film.pixels.len();
-            if !known(loan.borrower) || !known(loan.lender) {
-                return None;
-            }
-            film.loans.push(loan);
         }
         Some(film)
     }

@@ -126,29 +126,22 @@ impl EyeWalk<'_> {
 
     /// The photons at the first D: counted on the pixel's footprint, if this is it, else looked up.
     fn see_photons(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, sums: &mut PixelSums) {
-        let view = view_code(arrival.hit.sheet, branch.key);
-        let footprint = branch.main && self.view == Some(view);
-        let gain = bsdf.albedo().map(|albedo| {
+        let footprint = branch.main && self.view == Some(view_code(arrival.hit.sheet, branch.key));
+        if footprint && let Some(albedo) = bsdf.albedo() {
             // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
-            branch.throughput * albedo / std::f32::consts::PI
-        });
-        if let Some(gain) = gain.filter(|_| footprint) {
-            sums.gain += gain;
+            sums.gain += branch.throughput * albedo / std::f32::consts::PI;
         }
-        let looked_up = match self.lookups {
-            Lookups::Nowhere => Vec3::ZERO,
-            Lookups::OffFootprint if footprint => Vec3::ZERO,
+        match self.lookups {
+            Lookups::Nowhere => {}
+            Lookups::OffFootprint if footprint => {}
             Lookups::OffFootprint | Lookups::Everywhere => {
-                self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums)
+                self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums);
             }
-        };
-        if let Some(gain) = gain.filter(|_| self.at_border(branch)) {
-            self.borrow(view, arrival, gain, looked_up);
         }
     }
 
     /// The photons around the point, with a kernel of about a pixel times a factor; apart where they are in different
-    /// pictures. Returns their radiance where all are in one.
+    /// pictures.
     fn see_looked_up(
         &mut self,
         branch: &Branch,
@@ -156,20 +149,18 @@ impl EyeWalk<'_> {
         (bsdf, wider): (&Bsdf, f32),
         class: PathClass,
         sums: &mut PixelSums,
-    ) -> Vec3 {
-        let Some(photons) = self.context.photons else { return Vec3::ZERO };
+    ) {
+        let Some(photons) = self.context.photons else { return };
         let Some(language) = &self.context.plan.language else {
-            let radiance =
-                branch.throughput * self.look_up(photons, branch, arrival, (bsdf, wider), |_| true);
-            self.add(class, PICTURE, radiance, sums);
-            return radiance;
+            let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), |_| true);
+            self.add(class, PICTURE, branch.throughput * radiance, sums);
+            return;
         };
         for &pictures in language.parts(branch.trail) {
             let pick = |kind: Kind| language.pictures(branch.trail, kind) == pictures;
             let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), pick);
             self.add(class, pictures, branch.throughput * radiance, sums);
         }
-        Vec3::ZERO
     }
 
     /// Radiance by density estimation around the point, of the photons that are picked.

@@ -5,7 +5,6 @@ mod direct;
 mod footprint;
 mod forward;
 mod layers;
-mod lender;
 mod outline;
 mod specular;
 mod spread;
@@ -16,7 +15,7 @@ pub use specular::EyeCounts;
 pub use spread::Irradiance;
 
 use crate::effort::Effort;
-use crate::film::{Film, LayerSums, Loan, PixelSums, RoundFilm};
+use crate::film::{Film, LayerSums, PixelSums, RoundFilm};
 use crate::light_path::{Kind, PICTURE, PathClass, Pictures};
 use crate::pass1_light::{RoundPhotons, Spread};
 use crate::photon_map::PhotonMap;
@@ -79,7 +78,6 @@ pub fn trace_image(
     for tile in tiles {
         counts.add(&tile.counts);
         film.put(tile.x, tile.y, tile.width, &tile.pixels);
-        film.lend(&tile.loans);
         film.put_layers(tile.x, tile.y, tile.width, &tile.layers);
     }
     Ok((film, counts))
@@ -90,7 +88,6 @@ struct Tile {
     y: u32,
     width: u32,
     pixels: Vec<PixelSums>,
-    loans: Vec<Loan>,
     layers: Vec<LayerSums>,
     counts: EyeCounts,
 }
@@ -130,7 +127,7 @@ fn trace_tile(
             layers.extend_from_slice(walk.layers.sums());
         }
     }
-    Ok(Tile { x, y, width, pixels, loans: walk.loans, layers, counts: walk.counts })
+    Ok(Tile { x, y, width, pixels, layers, counts: walk.counts })
 }
 
 /// One pixel's samples of this round in both halves. Photons are counted on the pixel's footprint; the eye
@@ -156,7 +153,6 @@ fn trace_pixel(
     let first = context.film.pixels()[index].samples;
     let count = context.effort.samples(index).max(gathering);
     let mut sums = PixelSums { samples: count, ..PixelSums::default() };
-    walk.pixel = index as u32;
     walk.layers.clear();
     for half in 0..2 {
         if let (Some(footprint), Some(photons)) = (footprint, context.photons.filter(|_| gathers)) {

@@ -8,7 +8,7 @@
 use super::EyeContext;
 use super::direct::{environment_density, power_heuristic};
 use super::layers::PixelLayers;
-use crate::film::{Loan, PixelSums};
+use crate::film::PixelSums;
 use crate::geometry::Ray;
 use crate::light_path::{Bounce, PathClass, Trail};
 use crate::media::Media;
@@ -85,9 +85,6 @@ pub(super) struct EyeWalk<'a> {
     pub(super) sample: SamplePoint,
     pub(super) lookups: Lookups,
     pub(super) view: Option<u32>,
-    /// The pixel it belongs to, and what pixels borrow.
-    pub(super) pixel: u32,
-    pub(super) loans: Vec<Loan>,
     /// When it is followed, and whether it adds light straight from the lights.
     pub(super) time: f32,
     pub(super) direct: bool,
@@ -144,8 +141,6 @@ impl<'a> EyeWalk<'a> {
             sample,
             lookups: Lookups::Nowhere,
             view: None,
-            pixel: 0,
-            loans: Vec::new(),
             time: 0.0,
             direct: true,
             layers: PixelLayers::new(context.plan.layer_names.len()),

@@ -65,7 +65,7 @@ struct Filtered {
 }
 
 /// Sums over rectangles of a plane in constant time.
-pub(super) struct Sums {
+struct Sums {
     width: usize,
     height: usize,
     table: Vec<f64>,
@@ -275,7 +275,7 @@ fn running_sum(plane: &mut [Vec3], line: &mut [Vec3], half: usize, at: impl Fn(u
 }
 
 impl Sums {
-    pub(super) fn new((width, height): (usize, usize), values: impl Iterator<Item = f64>) -> Self {
+    fn new((width, height): (usize, usize), values: impl Iterator<Item = f64>) -> Self {
         let stride = width + 1;
         let mut table = vec![0.0; stride * (height + 1)];
         for (i, value) in values.enumerate() {
@@ -288,7 +288,7 @@ impl Sums {
 
     /// Sum over the square of `half` pixels around a pixel, clipped to the box.
     #[inline]
-    pub(super) fn around(&self, (x, y): (usize, usize), half: usize) -> f64 {
+    fn around(&self, (x, y): (usize, usize), half: usize) -> f64 {
         let stride = self.width + 1;
         let (x0, y0) = (x.saturating_sub(half), y.saturating_sub(half));
         let (x1, y1) = ((x + half + 1).min(self.width), (y + half + 1).min(self.height));

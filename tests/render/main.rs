@@ -3,7 +3,6 @@
 #![expect(clippy::unwrap_used, reason = "a failed helper fails its test")]
 
 mod bad_assets;
-mod borders;
 mod camera;
 mod caustics;
 mod checks;
