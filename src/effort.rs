@@ -34,7 +34,7 @@ pub struct Measured<'a> {
 }
 
 /// A photon costs its rays and its place in the tree: about as much as another ray.
-const PHOTON_OVERHEAD: f32 = 2.0;
+const PHOTON_OVERHEAD: f32 = 1.0;
 
 /// Most eye samples of a pixel and half in one round.
 const MOST_SAMPLES: f32 = 32.0;

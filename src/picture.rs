@@ -81,15 +81,15 @@ impl<'a> Picture<'a> {
     }
 
     /// Estimated relative error of the image: the root of the mean over pixels and channels of
-    /// (σ² + b²) / (L² + (0.1 L_mean)²). For what is sampled, σ² = (A - B)²/4 is the unbiased estimate of the
-    /// mean's variance from its two independent halves; for smoothed caustics the estimate that chose the
-    /// width, which holds the blur too. `None` before the first round.
+    /// (σ² + b²) / (L² + (0.1 L_mean)²), at the upper end of that mean's own 95 % range. For what is sampled, σ² = (A - B)²/4 is
+    /// the unbiased estimate of the mean's variance from its two independent halves; for smoothed caustics the noise and
+    /// the blur b of the chosen width. `None` before the first round.
     #[must_use]
     pub fn error_estimate(&self) -> Option<f32> {
         if self.film.rounds() == 0 {
             return None;
         }
-        Some(PixelError::root_mean(&self.errors()))
+        Some(PixelError::bound(&self.errors()))
     }
 
     /// Estimated relative squared error of every pixel, by what makes it.
@@ -98,13 +98,25 @@ impl<'a> Picture<'a> {
         let image = self.image();
         let mean = image.pixels.iter().map(|p| mean_channel(Vec3::from_array(*p))).sum::<f32>();
         let floor = 0.1 * mean / image.pixels.len() as f32;
-        let pixels = self.film.means().zip(&image.pixels).enumerate();
-        pixels.map(|(i, (means, value))| self.error(i, &means, Vec3::from_array(*value), floor)).collect()
+        let around = around(&image);
+        let pixels = self.film.means().zip(image.pixels.iter().zip(around)).enumerate();
+        pixels
+            .map(|(i, (means, (value, around)))| {
+                self.error(i, &means, (Vec3::from_array(*value), around), floor)
+            })
+            .collect()
     }
 
-    fn error(&self, index: usize, means: &PixelMeans, value: Vec3, floor: f32) -> PixelError {
-        let scale = value * value + floor * floor;
-        if scale.min_element() <= 0.0 {
+    /// The radiance that an error is relative to must not hold the error itself, or a single bright sample would never
+    /// count for more than its pixel: it is the darker half's, or what the pixels `around` agree on, up to the pixel's own.
+    fn error(
+        &self,
+        index: usize,
+        means: &PixelMeans,
+        (value, around): (Vec3, Vec3),
+        floor: f32,
+    ) -> PixelError {
+        if floor <= 0.0 {
             return PixelError::default();
         }
         let half = |class| 0.5 * (means.halves[0].get(class) - means.halves[1].get(class));
@@ -117,30 +129,59 @@ impl<'a> Picture<'a> {
         if smoothed.is_some() {
             photons -= means.gain * 0.5 * (means.irradiance[0] - means.irradiance[1]);
         }
+        let darker = value - (sampled + photons).abs();
         let photons = photons * photons + Vec3::splat(smoothed.unwrap_or(0.0));
+        let sampled = sampled * sampled;
+        let own = value * value + floor * floor;
+        let radiance = darker.max(value.min(around)).max(Vec3::ZERO);
         PixelError {
-            sampled: mean_channel(sampled * sampled / scale),
-            photons: mean_channel(photons / scale),
+            sampled: mean_channel(sampled / own),
+            photons: mean_channel(photons / own),
+            relative: mean_channel((sampled + photons) / (radiance * radiance + floor * floor)),
         }
     }
 }
 
-/// Estimated squared error of a pixel, relative to its squared radiance; mean over channels.
+/// Estimated squared error of a pixel, relative to a squared radiance; mean over channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelError {
-    /// Of what eye samples bring: emitted and direct light.
+    /// Of what eye samples bring, emitted and direct light, relative to the pixel's own radiance.
     pub sampled: f32,
-    /// Of what photons bring.
+    /// Of what photons bring, relative to the same.
     pub photons: f32,
+    /// Of both, relative to a radiance that does not hold the error.
+    pub relative: f32,
 }
 
 impl PixelError {
-    /// Root of the mean over pixels.
+    /// Root of the mean over pixels, which 95 in 100 true errors are below: where few pixels hold most of the error, the
+    /// estimate of it is itself uncertain. A pixel's error is a squared normal number, so that its variance is 2/3 of the
+    /// mean of its square.
     #[must_use]
-    pub fn root_mean(errors: &[Self]) -> f32 {
-        let sum: f64 = errors.iter().map(|e| f64::from(e.sampled + e.photons)).sum();
-        (sum / errors.len().max(1) as f64).sqrt() as f32
+    pub fn bound(errors: &[Self]) -> f32 {
+        /// Standard deviations above the mean that 5 % of a normal distribution exceed.
+        const ONE_SIDED_95: f64 = 1.645;
+        let sum: f64 = errors.iter().map(|e| f64::from(e.relative)).sum();
+        let squares: f64 = errors.iter().map(|e| f64::from(e.relative).powi(2)).sum();
+        ((sum + ONE_SIDED_95 * (squares * 2.0 / 3.0).sqrt()) / errors.len().max(1) as f64).sqrt() as f32
     }
+}
+
+/// What each pixel's neighbours agree on: the least mean of two that lie opposite to each other, by channel.
+fn around(image: &LinearImage) -> Vec<Vec3> {
+    const PAIRS: [(isize, isize); 4] = [(1, 0), (0, 1), (1, 1), (1, -1)];
+    let (width, height) = (image.width as isize, image.height as isize);
+    let at = |x: isize, y: isize| {
+        let inside = (0..width).contains(&x) && (0..height).contains(&y);
+        inside.then(|| Vec3::from_array(image.pixels[(y * width + x) as usize]))
+    };
+    let least = |i: usize| {
+        let (x, y) = (i as isize % width, i as isize / width);
+        let means =
+            PAIRS.iter().filter_map(|&(dx, dy)| Some(0.5 * (at(x - dx, y - dy)? + at(x + dx, y + dy)?)));
+        means.reduce(Vec3::min).unwrap_or(Vec3::ZERO)
+    };
+    (0..image.pixels.len()).map(least).collect()
 }
 
 fn add(mut image: LinearImage, correction: &[Vec3]) -> LinearImage {

@@ -109,6 +109,18 @@ impl Footprints {
         self.pixels.get(index)?.as_ref()
     }
 
+    /// True for a pixel without footprint beside one that has one: it shows an edge of something.
+    #[must_use]
+    pub fn at_border(&self, index: usize) -> bool {
+        if self.pixels.get(index).is_none_or(Option::is_some) {
+            return false;
+        }
+        let (x, y) = (index % self.width, index / self.width);
+        let columns = x.saturating_sub(1)..(x + 2).min(self.width);
+        let mut rows = y.saturating_sub(1)..(y + 2).min(self.pixels.len() / self.width);
+        rows.any(|row| self.pixels[row * self.width..][columns.clone()].iter().any(Option::is_some))
+    }
+
     /// True if any footprint is seen without any S between.
     #[must_use]
     pub fn any_direct(&self) -> bool {

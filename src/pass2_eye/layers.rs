@@ -27,6 +27,11 @@ impl PixelLayers {
         self.sums.fill(LayerSums::default());
     }
 
+    /// Scales what was looked up point by point, to the mean over the look-ups of a round.
+    pub(super) fn average_lookups(&mut self, factor: f32) {
+        self.sums.iter_mut().for_each(|layer| layer.looked_up *= factor);
+    }
+
     /// Adds to each of the layers among `pictures`.
     #[inline]
     pub(super) fn add(&mut self, pictures: Pictures, mut to: impl FnMut(&mut LayerSums)) {

@@ -149,7 +149,7 @@ fn trace_pixel(
         Some(footprint) if footprint.only_way => Lookups::Nowhere,
         Some(_) => Lookups::OffFootprint,
     };
-    let gathering = if lookups == Lookups::Nowhere { 0 } else { 1 };
+    let gathering = lookups_of_round(context, lookups, index);
     let first = context.film.pixels()[index].samples;
     let count = context.effort.samples(index).max(gathering);
     let mut sums = PixelSums { samples: count, ..PixelSums::default() };
@@ -189,7 +189,31 @@ fn trace_pixel(
             }
         }
     }
+    if gathering > 1 {
+        let share = 1.0 / gathering as f32;
+        sums.average_lookups(share);
+        walk.layers.average_lookups(share);
+    }
     sums
+}
+
+/// Look-ups of a pixel at a border, per half, for each of the plan's blocks that a round traces.
+const BORDER_LOOKUPS: u32 = 4;
+
+/// Most look-ups of a pixel and half in one round.
+const MOST_LOOKUPS: u32 = 32;
+
+/// Samples of a pixel and half that look photons up in a round. Rounds count by their photons: at a border, where one
+/// sample meets another surface than the next, a round of many photons with a single look-up would outweigh all others.
+/// (Elsewhere a second look-up of the same photons tells next to nothing: tried on a lens, moving balls and rough metal.)
+fn lookups_of_round(context: &EyeContext<'_>, lookups: Lookups, index: usize) -> u32 {
+    match lookups {
+        Lookups::Nowhere => 0,
+        Lookups::Everywhere if context.footprints.at_border(index) => {
+            (BORDER_LOOKUPS << context.effort.photon_shift).min(MOST_LOOKUPS)
+        }
+        Lookups::Everywhere | Lookups::OffFootprint => 1,
+    }
 }
 
 /// The irradiance that photons bring to a footprint, for each set of pictures that they give to.

@@ -79,7 +79,7 @@ impl Render {
         // A round at most doubles what was done before: no single one overruns a limit of time by far.
         let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);
         self.effort = Effort::decide(&measured, most_shift, key);
-        self.error = Some(PixelError::root_mean(&errors));
+        self.error = Some(PixelError::bound(&errors));
         self.preview = picture.image();
         self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));
     }

@@ -40,6 +40,9 @@ impl Level {
 /// Half widths of the windows over which noise and blur are averaged, from large to small.
 const WINDOWS: [usize; 5] = [48, 24, 12, 6, 4];
 
+/// Half width of the window over which the error of what was chosen is averaged.
+const ESTIMATE: usize = 6;
+
 /// A smaller window overrules a larger one only if it promises less than this share of its error.
 const OVERRULE: f32 = 0.6;
 
@@ -77,6 +80,12 @@ struct Cost {
     noise: Sums,
 }
 
+/// What each width costs each pixel.
+struct Costs<'a> {
+    levels: &'a [Filtered],
+    weights: &'a [f32],
+}
+
 impl Ladder {
     /// Filters the segment at every width and chooses. `floor` is the radiance below which errors count
     /// as absolute.
@@ -94,10 +103,13 @@ impl Ladder {
         let levels: Vec<Filtered> =
             LEVELS.par_iter().map(|level| filter(*level, &raw, &mask, segment.size)).collect();
         let weights = weights(segment, samples, &levels[3], floor);
-        let costs: Vec<Cost> =
-            (0..LEVELS.len()).into_par_iter().map(|l| cost(l, &levels, &weights, segment.size)).collect();
+        let costs = Costs { levels: &levels, weights: &weights };
+        let sums: Vec<Cost> =
+            (0..LEVELS.len()).into_par_iter().map(|level| costs.sums(level, segment.size)).collect();
         let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
-        Self { choices: choose(&levels, &costs, &counts, &weights) }
+        let mut choices = choose(&levels, &sums, &counts, &weights);
+        estimate(&mut choices, &costs, &counts);
+        Self { choices }
     }
 
     pub(super) fn choice(&self, local: usize) -> Choice {
@@ -145,21 +157,28 @@ fn weights(segment: &Segment, samples: &[Sample], smooth: &Filtered, floor: f32)
     weights
 }
 
-/// Unbiased estimates of what the width blurs away beyond one two steps finer, and of the noise it leaves.
-fn cost(level: usize, levels: &[Filtered], weights: &[f32], size: (usize, usize)) -> Cost {
-    let finer = level.saturating_sub(2);
-    let (a, b) = (&levels[level].halves[0], &levels[level].halves[1]);
-    let (fa, fb) = (&levels[finer].halves[0], &levels[finer].halves[1]);
-    // Blur grows with the variance of the kernel: what one step shows tells of the whole.
-    let ratio = if level == 0 { 0.0 } else { LEVELS[finer].variance() / LEVELS[level].variance() };
-    let whole = (1.0 - ratio).powi(-2);
-    let bias = |i: usize| mean_channel((a[i] - fa[i]) * (b[i] - fb[i])) * whole * weights[i];
-    let noise = |i: usize| {
-        let d = a[i] - b[i];
-        0.25 * mean_channel(d * d) * weights[i]
-    };
-    let plane = |f: &dyn Fn(usize) -> f32| Sums::new(size, (0..weights.len()).map(|i| f64::from(f(i))));
-    Cost { bias: plane(&bias), noise: plane(&noise) }
+impl Costs<'_> {
+    /// Unbiased estimates for a pixel, relative: of what a width blurs away beyond one two steps finer, and of the noise it
+    /// leaves.
+    fn at(&self, level: usize, i: usize) -> (f32, f32) {
+        let finer = level.saturating_sub(2);
+        let (a, b) = (self.levels[level].halves[0][i], self.levels[level].halves[1][i]);
+        let (fa, fb) = (self.levels[finer].halves[0][i], self.levels[finer].halves[1][i]);
+        // Blur grows with the variance of the kernel: what one step shows tells of the whole.
+        let ratio = if level == 0 { 0.0 } else { LEVELS[finer].variance() / LEVELS[level].variance() };
+        let whole = (1.0 - ratio).powi(-2);
+        let d = a - b;
+        let weight = self.weights[i];
+        (mean_channel((a - fa) * (b - fb)) * whole * weight, 0.25 * mean_channel(d * d) * weight)
+    }
+
+    /// Sums of the estimates of a width over windows.
+    fn sums(&self, level: usize, size: (usize, usize)) -> Cost {
+        let plane = |f: &dyn Fn((f32, f32)) -> f32| {
+            Sums::new(size, (0..self.weights.len()).map(|i| f64::from(f(self.at(level, i)))))
+        };
+        Cost { bias: plane(&|c| c.0), noise: plane(&|c| c.1) }
+    }
 }
 
 /// From large windows to small, the width with the least estimated error; one choice for every 2 × 2 pixels.
@@ -178,12 +197,12 @@ fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -
                 if !block.clone().any(lit) {
                     continue;
                 }
-                let (level, relative) = choose_level(costs, counts, (x, rows.start));
+                let level = choose_level(costs, counts, (x, rows.start));
                 let halves = &levels[level].halves;
                 for i in block.filter(|&i| weights[i] > 0.0) {
                     let irradiance = 0.5 * (halves[0][i] + halves[1][i]);
                     choices[i - rows.start * width] =
-                        Choice { irradiance, squared_error: relative / weights[i], level: level as u8 };
+                        Choice { irradiance, squared_error: 0.0, level: level as u8 };
                 }
             }
             choices
@@ -192,10 +211,24 @@ fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -
     row_pairs.concat()
 }
 
-/// The chosen width at a pixel and its estimated weighted squared error.
-fn choose_level(costs: &[Cost], counts: &Sums, at: (usize, usize)) -> (usize, f32) {
+/// The errors of what was chosen, averaged around each pixel: what decided on the width looked at the dearest of many
+/// estimates, and would promise too large an error.
+fn estimate(choices: &mut [Choice], costs: &Costs<'_>, counts: &Sums) {
+    let size = (counts.width, counts.height);
+    let at: Vec<(f32, f32)> =
+        choices.iter().enumerate().map(|(i, c)| costs.at(usize::from(c.level), i)).collect();
+    let bias = Sums::new(size, at.iter().map(|c| f64::from(c.0)));
+    let noise = Sums::new(size, at.iter().map(|c| f64::from(c.1)));
+    for (i, choice) in choices.iter_mut().enumerate().filter(|(i, _)| costs.weights[*i] > 0.0) {
+        let at = (i % size.0, i / size.0);
+        let around = |sums: &Sums| (sums.around(at, ESTIMATE) / counts.around(at, ESTIMATE)) as f32;
+        choice.squared_error = (around(&bias).max(0.0) + around(&noise)) / costs.weights[i];
+    }
+}
+
+/// The chosen width at a pixel.
+fn choose_level(costs: &[Cost], counts: &Sums, at: (usize, usize)) -> usize {
     let mut chosen = 0;
-    let mut error = f32::INFINITY;
     for (step, &window) in WINDOWS.iter().enumerate() {
         let mut estimates = [0.0_f32; LEVELS.len()];
         let mut bias = 0.0_f32;
@@ -210,9 +243,8 @@ fn choose_level(costs: &[Cost], counts: &Sums, at: (usize, usize)) -> (usize, f3
         if step == 0 || estimates[best] < OVERRULE * estimates[chosen] {
             chosen = best;
         }
-        error = estimates[chosen];
     }
-    (chosen, error)
+    chosen
 }
 
 /// Filters both halves within the mask: sums of masked values over sums of the mask, so that nothing is lost
