@@ -111,7 +111,7 @@ impl Attempt {
         live: Arc<Live>,
         files: &Files,
     ) -> Result<Self, Failure> {
-        let Claim { id, attempt: fence, owner } = claim;
+        let Claim { id, attempt: fence, owner, .. } = claim;
         let saved = files.checkpoint(id).map_err(|error| internal("checkpoint", &error))?;
         let render = planned.begin(saved.as_ref().map(|(_, render)| render.as_slice()));
         let now = Instant::now();

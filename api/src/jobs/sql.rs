@@ -1,6 +1,6 @@
 //! The statements that change jobs, and what they are about.
 
-use super::query::{parsed, state_of};
+use super::query::{self, parsed, state_of};
 use super::{Event, Failure, JobId, JobState, Milestone, Owner, StoreError};
 use rusqlite::{Connection, OptionalExtension, named_params, params};
 use serde_json::Value;
@@ -250,7 +250,7 @@ pub(super) fn claim(db: &Connection, now_ms: i64) -> Result<Option<Claim>, Store
         .optional()?;
     let Some((id, owner)) = next else { return Ok(None) };
     let (_, attempt) = apply(db, id, Event::Start, None, now_ms)?;
-    Ok(Some(Claim { id, attempt, owner }))
+    Ok(Some(Claim { id, attempt, owner, scene: query::scene(db, id)? }))
 }
 
 /// A job that has just been started.
@@ -259,6 +259,9 @@ pub(super) struct Claim {
     pub id: JobId,
     pub attempt: u32,
     pub owner: Owner,
+    /// Its scene, unless it has a file of its own. It comes with the claim, since the submission may be on its way to
+    /// the disk still, where no other connection sees it.
+    pub scene: Option<String>,
 }
 
 /// Keeps the plan of a running attempt.
