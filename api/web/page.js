@@ -14,7 +14,7 @@ const nephroid = new Nephroid();
 const $ = (id) => document.getElementById(id);
 
 const editor = new Editor({ edited: sceneEdited, submit: submitScene });
-const layers = new Layers(nephroid, (url, words) => show(url, words));
+const layers = new Layers(nephroid, { show, failed: showProblem });
 const recent = new RecentRenders(nephroid, {
   shown: () => following?.id,
   removed: (id) => id === following?.id && showScene(),

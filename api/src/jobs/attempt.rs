@@ -139,6 +139,7 @@ impl Attempt {
         if self.render.stop_reason().is_none() {
             match self.render.run_round(&self.live.control) {
                 Ok(()) => {}
+                Err(RoundError::Cancelled) if self.live.is_out_of_time() => return self.end_for_time(files),
                 Err(RoundError::Cancelled) => return Turn::Stopped,
                 Err(RoundError::Failed { code, detail }) => {
                     return Turn::Over(Err(Failure { code: code.into(), detail }));
@@ -185,8 +186,17 @@ impl Attempt {
         }
     }
 
+    /// The job has had its time within a round: its picture is that of the rounds before, if there are any.
+    fn end_for_time(&self, files: &Files) -> Turn {
+        if self.render.rounds() > 0 {
+            return self.conclude(files);
+        }
+        let detail = "Not one round was finished in the time that the service gives a job.".into();
+        Turn::Over(Err(Failure { code: "time_exceeded".into(), detail }))
+    }
+
     fn conclude(&self, files: &Files) -> Turn {
-        if self.live.control.is_cancelled() {
+        if self.live.control.is_cancelled() && !self.live.is_out_of_time() {
             return Turn::Stopped;
         }
         self.live.enter_phase(Phase::Encoding);
@@ -221,7 +231,8 @@ impl Attempt {
         Outcome {
             rounds: self.render.rounds(),
             error_estimate: self.render.error_estimate(),
-            stop_reason: self.render.stop_reason().map(Into::into),
+            // Where none was reached the service cut the last round off.
+            stop_reason: Some(self.render.stop_reason().unwrap_or("seconds").into()),
             stats: Some(self.render.stats()),
             history: self.live.history(),
             failure: None,

@@ -49,6 +49,8 @@ pub struct Progress {
 pub(super) struct Live {
     /// Stops the round that runs.
     pub(super) control: Control,
+    /// True once its time is over; its picture is then that of the rounds before.
+    out_of_time: AtomicBool,
     state: Mutex<LiveState>,
 }
 
@@ -99,6 +101,16 @@ impl Live {
 
     pub(super) fn preview(&self) -> Option<Arc<Preview>> {
         lock(&self.state).preview.clone()
+    }
+
+    /// Stops the round that runs because the job has had its time.
+    pub(super) fn end_its_time(&self) {
+        self.out_of_time.store(true, Ordering::SeqCst);
+        self.control.cancel();
+    }
+
+    pub(super) fn is_out_of_time(&self) -> bool {
+        self.out_of_time.load(Ordering::SeqCst)
     }
 
     /// How far it is by now, the round that runs included.

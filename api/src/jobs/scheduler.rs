@@ -11,6 +11,7 @@ use super::live::{Live, Registry};
 use super::retention::Ended;
 use super::sql::{self, Claim, Outcome};
 use super::store::{Store, StoreError};
+use super::watchdog::Watchdog;
 use super::{Event, Failure, JobId, Owner, service::now_ms};
 use crate::engine::PlannedScene;
 use crate::metrics::Metrics;
@@ -37,6 +38,7 @@ pub(super) struct Scheduler {
     pub(super) ended: mpsc::Sender<Ended>,
     pub(super) registry: Arc<Registry>,
     pub(super) pool: rayon::ThreadPool,
+    pub(super) watchdog: Watchdog,
     pub(super) concurrent: usize,
     pub(super) limits: Limits,
     pub(super) running: Vec<Attempt>,
@@ -131,10 +133,12 @@ impl Scheduler {
     }
 
     fn give_turn(&mut self, index: usize) {
-        let Self { pool, files, running, metrics, shares, .. } = self;
+        let Self { pool, files, running, metrics, shares, watchdog, limits, .. } = self;
         let attempt = &mut running[index];
         let before = attempt.seconds();
-        let turn = guarded(|| Ok(pool.install(|| attempt.take_turn(files, metrics))));
+        let (live, left) = (Arc::clone(&attempt.live), limits.max_seconds - before);
+        let round = || pool.install(|| attempt.take_turn(files, metrics));
+        let turn = guarded(|| Ok(watchdog.during(&live, left, round)));
         // A floor, so that rounds that take no time still pass the turn on.
         let took = (attempt.seconds() - before).max(1e-6);
         attempt.share += took;
@@ -233,7 +237,6 @@ mod tests {
     use super::*;
     use crate::jobs::query;
     use crate::jobs::sql::{NewJob, QueueLimits};
-    use crate::samples;
     use std::path::Path;
 
     fn scheduler(folder: &Path) -> Scheduler {
@@ -246,6 +249,7 @@ mod tests {
             ended: mpsc::channel().0,
             registry: Arc::default(),
             pool: rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap(),
+            watchdog: Watchdog::start().unwrap(),
             concurrent: 1,
             limits: Limits { max_seconds: 60.0, max_memory: 1 << 30, max_photons: 1 << 26 },
             running: Vec::new(),
@@ -253,24 +257,8 @@ mod tests {
         }
     }
 
-    fn submission() -> NewJob {
-        let text = samples::find("glass-ball").unwrap().text;
-        NewJob {
-            id: JobId::fresh(),
-            owner: Owner::anonymous(),
-            name: String::new(),
-            label: None,
-            size: [400, 300],
-            created_ms: 0,
-            scene: Some(text.into()),
-            bytes: text.len() as u64,
-            assets: Vec::new(),
-            idempotency: None,
-        }
-    }
-
     fn submit_and_claim(db: &rusqlite::Connection) -> Result<Claim, StoreError> {
-        sql::insert(db, &submission(), QueueLimits { queued: 1, unfinished: 1 })?;
+        sql::insert(db, &NewJob::sample(), QueueLimits { queued: 1, unfinished: 1 })?;
         Ok(sql::claim(db, 0)?.expect("it has just been submitted"))
     }
 
