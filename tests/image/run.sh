@@ -17,6 +17,7 @@ fail() { echo "make image: $*" >&2; exit 1; }
 # `health` the image's own health check, `size` prints its bytes.
 try() {
   for _ in $(seq 300); do curl -sf "http://127.0.0.1:$port/readyz" > /dev/null && break; sleep 0.1; done
+  curl -sf "http://127.0.0.1:$port/readyz" > /dev/null || fail "the service does not become ready"
   health || fail "the health check fails while the service is ready"
   [ "$(inside id -u)" != 0 ] || fail "the service is root"
   inside touch /data/written || fail "the data folder cannot be written"
@@ -111,13 +112,13 @@ enter() {
 }
 inside() { (enter "$@"); }
 health() {
-  local check; check=$(configured '{{join .Docker.Config.Healthcheck.Test " "}}')
+  local check; check=$(configured '{{range .Docker.Config.Healthcheck.Test}}{{print . " "}}{{end}}')
   # shellcheck disable=SC2086  # a command and its arguments
   [[ $check == CMD\ * ]] && inside ${check#CMD }
 }
 size() { du -sb --exclude=./data "$root" | cut -f1; }
 # shellcheck disable=SC2046  # a command and its arguments
-enter $(configured '{{join .Docker.Config.Cmd " "}}') &
+enter $(configured '{{range .Docker.Config.Cmd}}{{print . " "}}{{end}}') &
 server=$!
 try
 kill "$server"
