@@ -20,6 +20,8 @@ const PREVIEW_INTERVAL: Duration = Duration::from_millis(250);
 const INLINE_BYTES: usize = 512 << 10;
 /// Housekeeping (checkpoints, previews) takes at most one part in so many of the time.
 const HOUSEKEEPING_SHARE: u32 = 20;
+/// Previews that nobody has looked at since the last take less.
+const UNSEEN_SHARE: u32 = 100;
 
 /// What happened in a turn.
 #[derive(Debug)]
@@ -60,12 +62,13 @@ impl Chore {
         Self { due, interval }
     }
 
-    fn run(&mut self, work: impl FnOnce()) {
+    /// Does it if it is due, and so that it takes at most one part in `share` of the time.
+    fn run(&mut self, share: impl FnOnce() -> u32, work: impl FnOnce()) {
         let start = Instant::now();
         if start >= self.due {
             work();
             tracing::debug!(took = ?start.elapsed(), "housekeeping");
-            self.due = Instant::now() + self.interval.max(start.elapsed() * HOUSEKEEPING_SHARE);
+            self.due = Instant::now() + self.interval.max(start.elapsed() * share());
         }
     }
 }
@@ -148,7 +151,8 @@ impl Attempt {
         }
         let over = self.render.stop_reason().is_some();
         if !over {
-            self.preview.run(|| self.live.show(self.render.picture()));
+            let share = || if self.live.was_looked_at() { HOUSEKEEPING_SHARE } else { UNSEEN_SHARE };
+            self.preview.run(share, || self.live.show(self.render.picture()));
         }
         // After the preview: who reads of a finished round finds the picture of it.
         self.live.round_finished(self.progress());
@@ -156,7 +160,7 @@ impl Attempt {
             return self.conclude(files);
         }
         let Self { checkpoint, render, live, id, .. } = self;
-        checkpoint.run(|| save_checkpoint(files, *id, live, render));
+        checkpoint.run(|| HOUSEKEEPING_SHARE, || save_checkpoint(files, *id, live, render));
         Turn::Continue
     }
 

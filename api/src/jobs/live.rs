@@ -51,6 +51,8 @@ pub(super) struct Live {
     pub(super) control: Control,
     /// True once its time is over; its picture is then that of the rounds before.
     out_of_time: AtomicBool,
+    /// True if somebody has looked at the picture since that was asked last.
+    looked_at: AtomicBool,
     state: Mutex<LiveState>,
 }
 
@@ -100,7 +102,13 @@ impl Live {
     }
 
     pub(super) fn preview(&self) -> Option<Arc<Preview>> {
+        self.looked_at.store(true, Ordering::Relaxed);
         lock(&self.state).preview.clone()
+    }
+
+    /// Whether somebody has looked at the picture since the last call.
+    pub(super) fn was_looked_at(&self) -> bool {
+        self.looked_at.swap(false, Ordering::Relaxed)
     }
 
     /// Stops the round that runs because the job has had its time.
