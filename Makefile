@@ -39,7 +39,8 @@ openapi:
 crash:
 	NEPHROID_TEST_KILLS=$(or $(KILLS),200) cargo test --package nephroid-api --test http -- kill:: --nocapture
 
-# How many requests a second the service answers, on loopback (needs wrk: apt-get install wrk).
+# How many requests a second the service answers, on loopback, and what it costs over the command (needs wrk:
+# apt-get install wrk).
 load:
 	cargo build --release --package nephroid-api --package nephroid --bins
 	bash tests/load/run.sh

@@ -13,9 +13,11 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 pub use asked::Layer;
+pub use bounds::Bounds;
 pub use light_tree::{Asking, LightTree};
 
 mod asked;
+mod bounds;
 mod carry;
 mod details;
 pub(crate) mod language;
@@ -331,16 +333,20 @@ impl Plan {
     fn estimate_memory(&self, scene: &Scene) -> u64 {
         let a_round: u64 = self.photons.iter().map(Budget::bytes).sum();
         let photons = a_round << self.most_photon_shift();
-        let (width, height) = (scene.image.width, scene.image.height);
-        let pixels = u64::from(width) * u64::from(height);
-        let film = Film::bytes(width, height) + pixels * self.layer_names.len() as u64 * LayerSums::BYTES;
-        // A round and its tiles, while it is made, or the ladder of widths, while it is smoothed.
-        let passing =
-            if self.photons.is_empty() { 2 * film } else { (2 * film).max(pixels * SMOOTHING_BYTES) };
-        let per_pixel = Footprints::BYTES_PER_PIXEL + Irradiance::BYTES_PER_PIXEL;
-        let footprints = if self.photons.is_empty() { 0 } else { pixels * per_pixel };
-        scene.geometry.memory_bytes() + scene.image_bytes + film + footprints + passing + photons
+        frame_bytes(scene, self.layer_names.len(), !self.photons.is_empty()) + photons
     }
+}
+
+/// Memory of all but photons.
+fn frame_bytes(scene: &Scene, named_layers: usize, sends_photons: bool) -> u64 {
+    let (width, height) = (scene.image.width, scene.image.height);
+    let pixels = u64::from(width) * u64::from(height);
+    let film = Film::bytes(width, height) + pixels * named_layers as u64 * LayerSums::BYTES;
+    // A round and its tiles, while it is made, or the ladder of widths, while it is smoothed.
+    let passing = if sends_photons { (2 * film).max(pixels * SMOOTHING_BYTES) } else { 2 * film };
+    let per_pixel = Footprints::BYTES_PER_PIXEL + Irradiance::BYTES_PER_PIXEL;
+    let footprints = if sends_photons { pixels * per_pixel } else { 0 };
+    scene.geometry.memory_bytes() + scene.image_bytes + film + footprints + passing
 }
 
 fn sent(pilots: &[Pilot]) -> u64 {

@@ -3,11 +3,12 @@
 use crate::{error_map, samples};
 use nephroid::film::Film;
 use nephroid::image_io::{encode_exr, encode_png};
-use nephroid::plan::Plan;
+use nephroid::plan::{Bounds, Plan};
 use nephroid::render::{Render, RenderError};
 use nephroid::report;
 use nephroid::scene::assets::{AssetError, AssetSource};
 use nephroid::scene::{ImageSettings, Scene, SceneIssue, Tone};
+use rayon::prelude::*;
 use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -71,6 +72,13 @@ impl LoadedScene {
         let [width, height] = self.size();
         let scene = self.scene.geometry.memory_bytes() + self.scene.image_bytes;
         Film::bytes(width, height).saturating_add(scene)
+    }
+
+    /// True if a plan of it may ask for more than this.
+    #[must_use]
+    pub fn may_exceed(&self, memory_bytes: u64, photons: u64) -> bool {
+        let bounds = Bounds::of(&self.scene);
+        bounds.memory_bytes > memory_bytes || bounds.photons > photons
     }
 
     /// The scene's own name.
@@ -161,10 +169,10 @@ impl PlannedScene {
         self.plan.memory_bytes
     }
 
-    /// Photons that a round sends.
+    /// Photons that its largest round may send.
     #[must_use]
     pub fn photons_per_round(&self) -> u64 {
-        self.plan.photons.iter().map(|budget| 2_u64 << budget.log2_block).sum()
+        self.plan.most_photons()
     }
 
     /// Begins the render, from a checkpoint if there is one that fits.
@@ -296,23 +304,27 @@ impl RunningRender {
         }
     }
 
-    /// The pictures of a finished render.
+    /// The pictures of a finished render: the whole and its layers, each as it is shown and as light.
     pub fn outputs(&self) -> Result<Vec<Output>, String> {
         let picture = self.render.picture();
-        let image = picture.image();
-        let mut outputs = vec![
-            Output { name: "image.png".into(), bytes: self.png(&image)? },
-            Output {
-                name: "image.exr".into(),
-                bytes: encode_exr(&image).map_err(|error| error.to_string())?,
-            },
-        ];
-        for layer in self.render.layers() {
-            let bytes = self.png(&picture.part(&layer))?;
-            outputs.push(Output { name: format!("layers/{}.png", layer.name()), bytes });
-        }
+        let [png, exr] = self.both("image", &picture.image())?;
+        let mut outputs = vec![png, exr];
+        let layers = self.render.layers();
+        let parts = layers
+            .par_iter()
+            .map(|layer| self.both(&format!("layers/{}", layer.name()), &picture.part(layer)));
+        outputs.extend(parts.collect::<Result<Vec<_>, _>>()?.into_iter().flatten());
         outputs.push(Output { name: "error.png".into(), bytes: self.error_map(&picture)? });
         Ok(outputs)
+    }
+
+    /// A picture for displays, and for who adds its light to other light.
+    fn both(&self, name: &str, image: &LinearImage) -> Result<[Output; 2], String> {
+        let exr = encode_exr(image).map_err(|error| error.to_string())?;
+        Ok([
+            Output { name: format!("{name}.png"), bytes: self.png(image)? },
+            Output { name: format!("{name}.exr"), bytes: exr },
+        ])
     }
 
     /// The estimated error of each pixel, as colours.
@@ -367,6 +379,21 @@ mod tests {
         assert_eq!(resumed.rounds(), 2, "finished rounds are not made again");
         resumed.run_round(&control).expect("nothing stops it");
         assert!(resumed.picture().to_png() == straight.picture().to_png());
+    }
+
+    #[test]
+    fn no_plan_asks_for_more_than_its_bounds() {
+        for sample in samples::all() {
+            let scene = LoadedScene::read(sample.text, &SampleFiles, 60.0).expect("it is a scene");
+            let planned = scene.plan();
+            assert!(scene.may_exceed(planned.memory_bytes() - 1, u64::MAX), "{}", sample.name);
+            assert!(
+                scene.may_exceed(u64::MAX, planned.photons_per_round().saturating_sub(1)),
+                "{}",
+                sample.name
+            );
+            assert!(!scene.may_exceed(6 << 30, 1 << 26), "{} need not be planned to be taken", sample.name);
+        }
     }
 
     #[test]

@@ -25,13 +25,22 @@ impl Planner {
         Ok(Self { turns: Arc::new(Semaphore::new(AT_ONCE)), pool: Arc::new(pool), settings })
     }
 
-    /// Reads a scene and holds it against the limits of a job; gives the text back with it.
+    /// Reads a scene and holds it against the limits of a job; gives the text back with it. One that may be too much is
+    /// planned, to know.
     pub(crate) async fn read<F>(&self, text: String, files: F) -> Result<(String, LoadedScene), Problem>
     where
         F: SceneFiles + 'static,
     {
         let planner = self.clone();
-        self.run(move || planner.read_now(&text, &files).map(|scene| (text, scene))).await
+        let work = move || {
+            let scene = planner.read_now(&text, &files)?;
+            let limits = &planner.settings;
+            if scene.may_exceed(limits.max_memory as u64, limits.max_photons) {
+                planner.plan_now(&scene)?;
+            }
+            Ok((text, scene))
+        };
+        self.run(work).await
     }
 
     /// Reads a scene and plans it.
@@ -40,20 +49,15 @@ impl Planner {
         F: SceneFiles + 'static,
     {
         let planner = self.clone();
-        let work = move || {
-            let scene = planner.read_now(&text, &files)?;
-            let planned = planner.pool.install(|| scene.plan());
-            let (needed, limit) = (planned.memory_bytes(), planner.settings.max_memory as u64);
-            within("/image", needed, limit, "bytes of memory")?;
-            within(
-                "/render",
-                planned.photons_per_round(),
-                planner.settings.max_photons,
-                "photons per round",
-            )?;
-            Ok(planned)
-        };
-        self.run(work).await
+        self.run(move || planner.plan_now(&planner.read_now(&text, &files)?)).await
+    }
+
+    fn plan_now(&self, scene: &LoadedScene) -> Result<PlannedScene, Problem> {
+        let limits = &self.settings;
+        let planned = self.pool.install(|| scene.plan());
+        within("/image", planned.memory_bytes(), limits.max_memory as u64, "bytes of memory")?;
+        within("/render", planned.photons_per_round(), limits.max_photons, "photons per round")?;
+        Ok(planned)
     }
 
     fn read_now(&self, text: &str, files: &dyn SceneFiles) -> Result<LoadedScene, Problem> {

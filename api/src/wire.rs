@@ -138,9 +138,11 @@ fn links_of(job: &Job) -> BTreeMap<String, String> {
     for artifact in &job.artifacts {
         if artifact.name == "error.png" {
             link("error", &artifact.name);
-        } else if let Some(class) = artifact.name.strip_prefix("layers/") {
-            link(&format!("layer_{}", class.trim_end_matches(".png")), &artifact.name);
+            continue;
         }
+        let Some(layer) = artifact.name.strip_prefix("layers/") else { continue };
+        let Some((name, kind)) = layer.rsplit_once('.') else { continue };
+        link(&format!("{}_{name}", if kind == "exr" { "exr" } else { "layer" }), &artifact.name);
     }
     links
 }

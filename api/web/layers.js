@@ -1,8 +1,9 @@
 // The light paths of a finished picture, switched on and off: layers are added as light, not as colours.
 
+import { readExr } from "./exr.js";
 import { make } from "./recent.js";
 
-/** What each class of paths is, in words. */
+/** What each class of paths is, in words. The classes add up to the picture; other layers are parts of them. */
 const MEANING = {
   emitted: "lamps, seen directly, in mirrors and through glass",
   direct: "light straight from a lamp",
@@ -14,14 +15,18 @@ export class Layers {
   #group = document.getElementById("layers");
   #canvas = document.getElementById("mix");
   #job = null;
-  #on = new Set();
-  #pixels = new Map(); // layer → its light, three numbers per pixel
+  #classes = [];
+  #on = new Set(); // of the classes
+  #alone = null; // the link of what is shown by itself instead
+  #light = new Map(); // class → a promise of its light, three numbers per pixel
+  #display = null; // a promise of what makes numbers of a display of light
   #turn = 0;
 
   /** `show(url, words)` puts a whole picture into the frame; null leaves the frame to the mixture. */
-  constructor(nephroid, show) {
+  constructor(nephroid, { show, failed }) {
     this.nephroid = nephroid;
     this.show = show;
+    this.failed = failed;
   }
 
   hide() {
@@ -29,7 +34,8 @@ export class Layers {
     this.#turn += 1;
     this.#group.hidden = true;
     this.#canvas.hidden = true;
-    this.#pixels.clear();
+    this.#light.clear();
+    this.#display = null;
   }
 
   /** Offers the layers of a finished job. */
@@ -37,104 +43,109 @@ export class Layers {
     if (this.#job?.id === job.id) return;
     this.hide();
     this.#job = job;
-    const names = Object.keys(job.links).filter((name) => name.startsWith("layer_")).map((name) => name.slice(6));
-    this.#on = new Set(names);
-    const buttons = names.map((name) => this.#toggle(name));
-    if (job.links.error) buttons.push(this.#errorButton());
+    const names = Object.keys(job.links).filter((link) => link.startsWith("layer_")).map((link) => link.slice(6));
+    this.#classes = Object.keys(MEANING).filter((name) => names.includes(name));
+    this.#on = new Set(this.#classes);
+    this.#alone = null;
+    const named = names.filter((name) => !this.#classes.includes(name));
+    const buttons = this.#classes.map((name) => this.#switch(name));
+    buttons.push(...named.map((name) => this.#single(`layer_${name}`, name, "A layer that the scene names, by itself")));
+    if (job.links.error) buttons.push(this.#single("error", "error map", "Estimated error of each pixel: dark 0.1 %, bright 100 %"));
+    buttons.find((button) => button.dataset.alone)?.classList.add("first-alone");
     this.#group.replaceChildren(...buttons);
     this.#group.hidden = !buttons.length;
-    this.show(job.links.image, `The finished picture: ${job.name}`);
+    this.#update();
   }
 
-  #toggle(name) {
-    const button = Object.assign(make("button", "", name), { type: "button", title: MEANING[name] ?? "" });
+  /** Switches a class on and off. */
+  #switch(name) {
+    const button = Object.assign(make("button", "", name), { type: "button", title: MEANING[name] });
     button.dataset.layer = name;
     button.addEventListener("click", () => {
-      if (!this.#on.delete(name)) this.#on.add(name);
+      if (!this.#alone && !this.#on.delete(name)) this.#on.add(name);
+      this.#alone = null;
       this.#update();
     });
-    button.setAttribute("aria-pressed", "true");
     return button;
   }
 
-  #errorButton() {
-    const button = Object.assign(make("button", "map", "error map"), { type: "button" });
-    button.title = "Estimated error of each pixel: dark 0.1 %, bright 100 %";
-    button.setAttribute("aria-pressed", "false");
-    button.addEventListener("click", () => this.#update(button.getAttribute("aria-pressed") === "false"));
+  /** Shows something by itself, and the picture again. */
+  #single(link, words, title) {
+    const button = Object.assign(make("button", "", words), { type: "button", title });
+    button.dataset.alone = link;
+    button.addEventListener("click", () => {
+      this.#alone = this.#alone === link ? null : link;
+      this.#update();
+    });
     return button;
   }
 
-  async #update(errorMap = false) {
+  #update() {
     const turn = (this.#turn += 1);
-    const { links, name } = this.#job;
     for (const button of this.#group.children) {
-      const { layer } = button.dataset;
-      button.setAttribute("aria-pressed", layer ? !errorMap && this.#on.has(layer) : errorMap);
+      const { layer, alone } = button.dataset;
+      button.setAttribute("aria-pressed", layer ? !this.#alone && this.#on.has(layer) : alone === this.#alone);
     }
-    const all = Object.keys(links).filter((link) => link.startsWith("layer_")).length === this.#on.size;
+    const { links, name } = this.#job;
+    if (this.#alone) return this.#whole(links[this.#alone], this.#alone === "error" ? `Estimated error of ${name}: dark is exact, bright is wrong` : `${this.#alone.slice(6)} of ${name}`);
+    if (this.#on.size === this.#classes.length) return this.#whole(links.image, `The finished picture: ${name}`);
+    const on = this.#classes.filter((layer) => this.#on.has(layer));
+    const draw = (mixed) => turn === this.#turn && this.#draw(mixed, on);
+    const fail = (error) => (this.#light.clear(), turn === this.#turn && this.failed(error));
+    this.#mix(on).then(draw, fail);
+  }
+
+  #whole(url, words) {
     this.#canvas.hidden = true;
-    if (errorMap) return this.show(links.error, `Estimated error of ${name}: dark is exact, bright is wrong`);
-    if (all) return this.show(links.image, `The finished picture: ${name}`);
-    const [only] = this.#on;
-    if (this.#on.size === 1) return this.show(links[`layer_${only}`], `${only} light of ${name}`);
-    const mixed = await this.#mix([...this.#on]);
-    if (turn !== this.#turn) return;
-    this.#canvas.width = mixed.width;
-    this.#canvas.height = mixed.height;
+    this.show(url, words);
+  }
+
+  #draw(mixed, on) {
+    Object.assign(this.#canvas, { width: mixed.width, height: mixed.height });
     this.#canvas.getContext("2d").putImageData(mixed, 0, 0);
-    this.#canvas.setAttribute("aria-label", this.#on.size ? `${[...this.#on].join(" and ")} light of ${name}` : "No light");
+    this.#canvas.setAttribute("aria-label", on.length ? `${on.join(" and ")} light of ${this.#job.name}` : "No light");
     this.show(null);
     this.#canvas.hidden = false;
   }
 
-  /** The sum of some layers. Where a layer is white it may have been brighter: there the sum is too dark. */
+  /** The sum of some classes, as the service would show it. */
   async #mix(names) {
     const { width, height } = this.#job;
-    const tone = await this.#tone();
-    const layers = await Promise.all(names.map((name) => this.#light(name, tone)));
+    const toDisplay = await (this.#display ??= this.#develops());
+    const layers = await Promise.all(names.map((name) => this.#lightOf(name)));
     const mixed = new ImageData(width, height);
-    for (let i = 0, k = 0; i < mixed.data.length; i += 1) {
-      if (i % 4 === 3) mixed.data[i] = 255;
-      else mixed.data[i] = tone.encode(layers.reduce((sum, layer) => sum + layer[k], 0)), (k += 1);
+    for (let i = 0, k = 0; i < mixed.data.length; i += 4, k += 3) {
+      for (let c = 0; c < 3; c += 1) {
+        let sum = 0;
+        for (const light of layers) sum += light[k + c];
+        mixed.data[i + c] = toDisplay(sum);
+      }
+      mixed.data[i + 3] = 255;
     }
     return mixed;
   }
 
-  async #light(name, tone) {
-    if (!this.#pixels.has(name)) {
-      const image = new Image();
-      image.src = this.#job.links[`layer_${name}`];
-      await image.decode();
-      const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
-      const context = canvas.getContext("2d");
-      context.drawImage(image, 0, 0);
-      const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
-      const table = Float32Array.from({ length: 256 }, (_, code) => tone.decode(code));
-      this.#pixels.set(name, Float32Array.from(data.filter((_, i) => i % 4 !== 3), (code) => table[code]));
+  #lightOf(name) {
+    if (!this.#light.has(name)) {
+      const file = this.nephroid.picture(this.#job.id, `layers/${name}.exr`);
+      this.#light.set(name, file.then((blob) => blob.arrayBuffer()).then(readExr).then(({ light }) => light));
     }
-    return this.#pixels.get(name);
+    return this.#light.get(name);
   }
 
-  async #tone() {
-    const scene = JSON.parse(await this.nephroid.scene(this.#job.id));
-    return TONES[scene.image?.tone] ?? TONES.linear;
+  async #develops() {
+    const { image = {} } = JSON.parse(await this.nephroid.scene(this.#job.id));
+    const gain = 2 ** (image.exposure ?? 0);
+    const tone = image.tone === "filmic" ? filmic : (x) => x;
+    return (light) => encode(tone(light * gain));
   }
 }
 
-const toLinear = (x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
-const toDisplay = (x) => 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * Math.min(x, 1) ** (1 / 2.4) - 0.055);
+/** The fit of the ACES curve by Narkowicz, as the service has it. */
+function filmic(light) {
+  const x = Math.min(Math.max(light, 0), 1e6);
+  return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
+}
 
-/** Between codes of a picture and light, for each tone that a scene may ask for. */
-const TONES = {
-  linear: { decode: (code) => toLinear(code / 255), encode: toDisplay },
-  filmic: {
-    // y = x (a x + b) / (x (c x + d) + e), solved for x.
-    decode: (code) => {
-      const y = Math.min(toLinear(code / 255), 0.999);
-      const [a, b, c] = [2.51 - 2.43 * y, 0.03 - 0.59 * y, -0.14 * y];
-      return (-b + Math.sqrt(b * b - 4 * a * c)) / (2 * a);
-    },
-    encode: (x) => toDisplay((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)),
-  },
-};
+/** From linear to the codes of sRGB; the canvas rounds and clips. */
+const encode = (x) => 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);

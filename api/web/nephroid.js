@@ -99,7 +99,7 @@ export class Nephroid {
     return (await checked(answer)).blob();
   }
 
-  /** A finished picture as a Blob: `image.png`, `image.exr`, `error.png`, `layers/caustic.png`, `chart.svg`. */
+  /** A finished picture as a Blob: `image.png`, `image.exr`, `error.png`, `layers/caustic.png` or `.exr`, `chart.svg`. */
   async picture(id, name = "image.png", { signal } = {}) {
     return (await this.#send(`/v1/renders/${id}/${name}`, { signal })).blob();
   }

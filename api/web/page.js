@@ -14,7 +14,7 @@ const nephroid = new Nephroid();
 const $ = (id) => document.getElementById(id);
 
 const editor = new Editor({ edited: sceneEdited, submit: submitScene });
-const layers = new Layers(nephroid, (url, words) => show(url, words));
+const layers = new Layers(nephroid, { show, failed: showProblem });
 const recent = new RecentRenders(nephroid, {
   shown: () => following?.id,
   removed: (id) => id === following?.id && showScene(),
@@ -68,7 +68,9 @@ async function loadSamples() {
   samples.forEach((sample, i) => $("samples").append(card(sample, texts[i])));
   const first = Math.max(0, samples.findIndex((sample) => sample.name === "glass-ball"));
   if (!samples.length || editor.text) return;
-  $("samples").querySelectorAll("input")[first].checked = true;
+  const input = $("samples").querySelectorAll("input")[first];
+  input.checked = true;
+  input.closest(".card").scrollIntoView({ block: "nearest", inline: "center" });
   setScene(texts[first]);
   chosen = samples[first];
 }
@@ -311,15 +313,26 @@ function setState(state, words) {
 }
 
 function fillPlan(plan) {
-  const rows = (plan.decisions ?? []).map((decision) => {
-    const row = make("tr", decision.runs ? "" : "left-out");
-    row.append(make("th", "", decision.topic), make("td", "", decision.choice), make("td", "", decision.reason));
-    row.firstChild.scope = "row";
-    return row;
+  const all = plan.decisions ?? [];
+  const rows = [["Runs", true], ["Left out", false]].flatMap(([words, runs]) => {
+    const some = all.filter((decision) => decision.runs === runs);
+    return some.length ? [groupRow(words), ...some.map(decisionRow)] : [];
   });
   $("decisions").replaceChildren(...rows);
   $("warnings").replaceChildren(...(plan.warnings ?? []).map((warning) => make("li", "", warning.message)));
   $("plan-box").hidden = false;
+}
+
+function groupRow(words) {
+  const row = make("tr", "group");
+  row.append(Object.assign(make("th", "", words), { scope: "rowgroup", colSpan: 3 }));
+  return row;
+}
+
+function decisionRow({ topic, choice, reason, runs }) {
+  const row = make("tr", runs ? "" : "left-out");
+  row.append(Object.assign(make("th", "", topic), { scope: "row" }), make("td", "", choice), make("td", "", reason));
+  return row;
 }
 
 // ---- words and elements

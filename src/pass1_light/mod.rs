@@ -60,12 +60,22 @@ impl Budget {
     /// which double as they grow, and light images, here and on the screen.
     #[must_use]
     pub fn bytes(&self) -> u64 {
+        (2 << self.log2_block) * Self::bytes_per_point(self.carries)
+    }
+
+    fn bytes_per_point(carries: Carries) -> u64 {
         let photon = 2 * size_of::<Photon>() as u64 + 3 * photon_map::BYTES_PER_PHOTON;
-        let images = match self.carries {
+        let images = match carries {
             Carries::Points => 0,
             Carries::LightImages => 2 * IMAGES_PER_POINT * size_of::<LightImage>() as u64,
         };
-        (2 << self.log2_block) * (photon + images)
+        photon + images
+    }
+
+    /// The same for each photon of a round, where one with light images counts as the photons that it stands for.
+    pub(crate) fn most_bytes_per_photon(photons_per_image: u64) -> u64 {
+        let [points, images] = [Carries::Points, Carries::LightImages].map(Self::bytes_per_point);
+        points.max(images / photons_per_image)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Clients that mean harm, or do it.
 
 use crate::bad_input::peak_memory_kib;
-use crate::server::{Server, endless, quick, scene, until};
+use crate::server::{Server, endless, png_size, quick, scene};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -93,8 +93,7 @@ async fn ten_thousand_requests_at_once_are_answered_in_bounded_memory() {
 #[tokio::test]
 async fn every_limit_of_a_scene_is_told_with_its_number() {
     let data = tempfile::tempdir().unwrap();
-    let limits =
-        ["--max-primitives", "1", "--max-lights", "1", "--max-memory", "300M", "--max-photons", "1000"];
+    let limits = ["--max-primitives", "1", "--max-lights", "1", "--max-memory", "300M"];
     let server = Server::start(data.path(), &limits);
     let refused = async |path: &str, scene: &Value| -> Value {
         let answer = server.post(path, scene.to_string()).await;
@@ -115,13 +114,48 @@ async fn every_limit_of_a_scene_is_told_with_its_number() {
     alone["image"] = json!({ "width": 3000, "height": 2000 });
     let problem = refused("/v1/renders", &alone).await;
     assert!(problem["detail"].as_str().unwrap().contains("memory"), "{problem:#}");
+}
 
+#[tokio::test]
+async fn what_only_a_plan_tells_is_held_against_the_limits_before_a_job_is_taken() {
     let data = tempfile::tempdir().unwrap();
-    let server = Server::start(data.path(), &["--max-photons", "1000"]);
-    let answer = server.post("/v1/plans", quick().to_string()).await;
-    assert_eq!(answer.status(), StatusCode::UNPROCESSABLE_ENTITY);
-    assert!(answer.text().await.unwrap().contains("photons"));
+    let server = Server::start(data.path(), &[]);
+    let plan: Value = server.post("/v1/plans", quick().to_string()).await.json().await.unwrap();
+    let memory = plan["memory_bytes"].as_u64().unwrap();
+    let enough = ["--max-memory", &memory.to_string()];
+    let little = ["--max-memory", &(memory - 1).to_string()];
+    let cases = [(little, "memory", memory - 1), (["--max-photons", "1000"], "photons", 1000)];
+    for (flags, what, limit) in cases {
+        let data = tempfile::tempdir().unwrap();
+        let server = Server::start(data.path(), &flags);
+        for path in ["/v1/plans", "/v1/renders", "/v1/renders?validate_only=true"] {
+            let answer = server.post(path, quick().to_string()).await;
+            assert_eq!(answer.status(), StatusCode::UNPROCESSABLE_ENTITY, "{path} {what}");
+            let problem: Value = answer.json().await.unwrap();
+            assert_eq!((&problem["code"], &problem["limit"]), (&json!("limit_exceeded"), &json!(limit)));
+            assert!(problem["detail"].as_str().unwrap().contains(what), "{problem:#}");
+        }
+        assert_eq!(server.get_json("/v1/renders").await["renders"], json!([]));
+    }
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &enough);
     let id = server.submit(&quick()).await;
-    let job = until(async || Some(server.job(&id).await).filter(|job| job["done"] == true)).await;
-    assert_eq!(job["error"]["code"], "limit_exceeded", "{job:#}");
+    server.wait_for_state(&id, "succeeded").await;
+}
+
+#[tokio::test]
+async fn no_job_takes_more_than_its_time() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &["--max-seconds", "2"]);
+    let id = server.submit(&scene([48, 36], 1_000_000)).await;
+    let job = server.wait_for_state(&id, "succeeded").await;
+    assert_eq!(job["stop_reason"], "seconds");
+    assert_eq!(png_size(&server.png(&id).await), [48, 36]);
+
+    // The first round of this takes many times longer.
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &["--max-seconds", "0.05"]);
+    let id = server.submit(&scene([2400, 1800], 1)).await;
+    let job = server.wait_for_state(&id, "failed").await;
+    assert_eq!((&job["error"]["code"], &job["rounds"]), (&json!("time_exceeded"), &json!(0)));
 }

@@ -2,6 +2,9 @@
 
 use crate::server::{DEADLINE, Server, until};
 use fantoccini::{Client, ClientBuilder, Locator};
+use nephroid::develop::develop;
+use nephroid::image_io::{self, ImageFormat};
+use nephroid::scene::{ImageSettings, Tone};
 use serde_json::{Value, json};
 use std::process::{Child, Command, Stdio};
 
@@ -104,6 +107,10 @@ async fn a_visitor_mends_a_scene_watches_it_and_takes_it_home() {
     browser.goto(&server.base).await.unwrap();
     click(&browser, "input[name=sample][value=glass-ball]").await;
     shrink(&browser, [160, 120], 64).await;
+    // Highlights far above what a display shows, so that layers must be added before they are toned.
+    let bright = "(text) => { const scene = JSON.parse(text); Object.assign(scene.image, { tone: 'filmic', exposure: 2 });
+        return JSON.stringify(scene, null, 2); }";
+    edit(&browser, bright).await;
 
     // A mistake is shown at its line while it is typed, and is selected when it is submitted.
     edit(&browser, "(text) => text.replace('\"radius\"', '\"extra\": 1, \"radius\"')").await;
@@ -139,7 +146,7 @@ async fn a_visitor_mends_a_scene_watches_it_and_takes_it_home() {
     let shown = seen(&browser, SHOWN).await;
     assert!(shown[0].as_str().unwrap().ends_with("/image.png") && shown[1] == 160, "{shown}");
 
-    check_layers(&browser).await;
+    check_layers(&browser, &server).await;
     for (id, kind) in
         [("download", "image/png"), ("download-exr", "image/x-exr"), ("download-chart", "image/svg+xml")]
     {
@@ -153,21 +160,51 @@ async fn a_visitor_mends_a_scene_watches_it_and_takes_it_home() {
     browser.close().await.unwrap();
 }
 
-/// Switches layers off: one by one the picture changes, and without caustics the bright spot is gone.
-async fn check_layers(browser: &Client) {
-    let brightest = "const canvas = document.getElementById('mix'); if (canvas.hidden || canvas.width !== 160) return null;
-        const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
-        let sum = 0; for (let i = 0; i < data.length; i += 4) sum += data[i]; return sum";
+/// Switches layers off: without caustics the bright spot is gone, and what is left adds up as the service adds it.
+async fn check_layers(browser: &Client, server: &Server) {
     click(browser, "#layers button[data-layer=caustic]").await;
-    let without = seen(browser, brightest).await.as_u64().unwrap();
+    let without = seen(browser, &mixed("emitted and direct")).await;
     click(browser, "#layers button[data-layer=caustic]").await;
     click(browser, "#layers button[data-layer=emitted]").await;
-    let with = until(async || run(browser, brightest).await.as_u64().filter(|&sum| sum != without)).await;
-    assert!(with > without, "{with} against {without}: caustics are light");
-    click(browser, "#layers button.map").await;
+    let with = seen(browser, &mixed("direct and caustic")).await;
+    let expected =
+        added(server, &run(browser, "return location.hash.slice(1)").await, ["direct", "caustic"]).await;
+    let codes = |mixed: &Value| -> Vec<u8> { serde_json::from_value(mixed.clone()).unwrap() };
+    let most = codes(&with).iter().zip(&expected).map(|(shown, right)| shown.abs_diff(*right)).max();
+    assert!(most <= Some(1), "a code is off by {most:?}");
+    let sum = |mixed: &Value| codes(mixed).into_iter().map(u64::from).sum::<u64>();
+    assert!(sum(&with) > sum(&without), "caustics are light");
+    click(browser, "#layers button[data-alone=error]").await;
     let map = "const image = document.getElementById('image');
         return !image.hidden && image.src.endsWith('/error.png') && image.naturalWidth === 160";
     seen(browser, map).await;
+}
+
+/// The codes of red, green and blue in the frame, once it shows the light of these layers.
+fn mixed(layers: &str) -> String {
+    format!(
+        "const canvas = document.getElementById('mix');
+        if (canvas.hidden || !canvas.getAttribute('aria-label').startsWith('{layers} light')) return null;
+        const {{ data }} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+        return [...data].filter((_, i) => i % 4 !== 3)"
+    )
+}
+
+/// Two layers of a job, added as light and then exposed and toned.
+async fn added(server: &Server, id: &Value, names: [&str; 2]) -> Vec<u8> {
+    let mut layers = Vec::new();
+    for name in names {
+        let path = format!("/v1/renders/{}/layers/{name}.exr", id.as_str().unwrap());
+        let file = server.get(&path).await.bytes().await.unwrap();
+        layers.push(image_io::decode(&file, ImageFormat::Exr).unwrap());
+    }
+    let (mut sum, other) = (layers.remove(0), layers.remove(0));
+    let channels = sum.pixels.iter_mut().flatten();
+    channels.zip(other.pixels.iter().flatten()).for_each(|(channel, more)| *channel += more);
+    let brightest = sum.pixels.iter().flatten().copied().fold(0.0, f32::max);
+    assert!(brightest * 4.0 > 2.0, "{brightest} is no highlight");
+    let settings = ImageSettings { width: sum.width, height: sum.height, exposure: 2.0, tone: Tone::Filmic };
+    develop(&sum, &settings)
 }
 
 /// Starts a job that would not end, and cancels it.

@@ -1,6 +1,7 @@
 //! From a scene to its picture.
 
 use crate::server::{Server, endless, png_size, quick, scene};
+use nephroid::image_io::{ImageFormat, decode};
 use reqwest::StatusCode;
 use serde_json::Value;
 
@@ -32,7 +33,7 @@ async fn every_link_of_a_finished_job_leads_somewhere() {
     let id = server.submit(&quick()).await;
     let job = server.wait_for_state(&id, "succeeded").await;
     let links = job["links"].as_object().unwrap();
-    for wanted in ["self", "scene", "image", "exr", "layer_caustic", "layer_direct", "layer_emitted"] {
+    for wanted in ["self", "scene", "image", "exr", "layer_caustic", "layer_direct", "exr_emitted"] {
         let path = links[wanted].as_str().unwrap();
         assert_eq!(server.get(path).await.status(), StatusCode::OK, "{path}");
     }
@@ -40,6 +41,28 @@ async fn every_link_of_a_finished_job_leads_somewhere() {
     assert_eq!(&exr[..4], [0x76, 0x2f, 0x31, 0x01], "the magic number of OpenEXR");
     let sent: Value = server.get_json(links["scene"].as_str().unwrap()).await;
     assert_eq!(sent, quick());
+}
+
+#[tokio::test]
+async fn the_layers_of_the_classes_add_up_to_the_picture() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &[]);
+    let id = server.submit(&quick()).await;
+    let job = server.wait_for_state(&id, "succeeded").await;
+    let read = async |path: &Value| {
+        let answer = server.get(path.as_str().unwrap()).await;
+        assert_eq!(answer.headers()["content-type"], "image/x-exr");
+        decode(&answer.bytes().await.unwrap(), ImageFormat::Exr).unwrap()
+    };
+    let whole = read(&job["links"]["exr"]).await;
+    let mut sum = vec![0.0; 3 * whole.pixels.len()];
+    for class in ["emitted", "direct", "caustic"] {
+        let layer = read(&job["links"][format!("exr_{class}")]).await;
+        sum.iter_mut().zip(layer.pixels.iter().flatten()).for_each(|(sum, light)| *sum += light);
+    }
+    // Three roundings of 32-bit floats.
+    let off = |(sum, whole): (&f32, &f32)| (sum - whole).abs() > 4.0 * f32::EPSILON * whole.abs();
+    assert_eq!(sum.iter().zip(whole.pixels.iter().flatten()).filter(|pair| off(*pair)).count(), 0);
 }
 
 #[tokio::test]

@@ -20,6 +20,8 @@ const PREVIEW_INTERVAL: Duration = Duration::from_millis(250);
 const INLINE_BYTES: usize = 512 << 10;
 /// Housekeeping (checkpoints, previews) takes at most one part in so many of the time.
 const HOUSEKEEPING_SHARE: u32 = 20;
+/// Previews that nobody has looked at since the last take less.
+const UNSEEN_SHARE: u32 = 100;
 
 /// What happened in a turn.
 #[derive(Debug)]
@@ -60,12 +62,13 @@ impl Chore {
         Self { due, interval }
     }
 
-    fn run(&mut self, work: impl FnOnce()) {
+    /// Does it if it is due, and so that it takes at most one part in `share` of the time.
+    fn run(&mut self, share: impl FnOnce() -> u32, work: impl FnOnce()) {
         let start = Instant::now();
         if start >= self.due {
             work();
             tracing::debug!(took = ?start.elapsed(), "housekeeping");
-            self.due = Instant::now() + self.interval.max(start.elapsed() * HOUSEKEEPING_SHARE);
+            self.due = Instant::now() + self.interval.max(start.elapsed() * share());
         }
     }
 }
@@ -111,7 +114,7 @@ impl Attempt {
         live: Arc<Live>,
         files: &Files,
     ) -> Result<Self, Failure> {
-        let Claim { id, attempt: fence, owner } = claim;
+        let Claim { id, attempt: fence, owner, .. } = claim;
         let saved = files.checkpoint(id).map_err(|error| internal("checkpoint", &error))?;
         let render = planned.begin(saved.as_ref().map(|(_, render)| render.as_slice()));
         let now = Instant::now();
@@ -139,6 +142,7 @@ impl Attempt {
         if self.render.stop_reason().is_none() {
             match self.render.run_round(&self.live.control) {
                 Ok(()) => {}
+                Err(RoundError::Cancelled) if self.live.is_out_of_time() => return self.end_for_time(files),
                 Err(RoundError::Cancelled) => return Turn::Stopped,
                 Err(RoundError::Failed { code, detail }) => {
                     return Turn::Over(Err(Failure { code: code.into(), detail }));
@@ -147,7 +151,8 @@ impl Attempt {
         }
         let over = self.render.stop_reason().is_some();
         if !over {
-            self.preview.run(|| self.live.show(self.render.picture()));
+            let share = || if self.live.was_looked_at() { HOUSEKEEPING_SHARE } else { UNSEEN_SHARE };
+            self.preview.run(share, || self.live.show(self.render.picture()));
         }
         // After the preview: who reads of a finished round finds the picture of it.
         self.live.round_finished(self.progress());
@@ -155,7 +160,7 @@ impl Attempt {
             return self.conclude(files);
         }
         let Self { checkpoint, render, live, id, .. } = self;
-        checkpoint.run(|| save_checkpoint(files, *id, live, render));
+        checkpoint.run(|| HOUSEKEEPING_SHARE, || save_checkpoint(files, *id, live, render));
         Turn::Continue
     }
 
@@ -185,8 +190,17 @@ impl Attempt {
         }
     }
 
+    /// The job has had its time within a round: its picture is that of the rounds before, if there are any.
+    fn end_for_time(&self, files: &Files) -> Turn {
+        if self.render.rounds() > 0 {
+            return self.conclude(files);
+        }
+        let detail = "Not one round was finished in the time that the service gives a job.".into();
+        Turn::Over(Err(Failure { code: "time_exceeded".into(), detail }))
+    }
+
     fn conclude(&self, files: &Files) -> Turn {
-        if self.live.control.is_cancelled() {
+        if self.live.control.is_cancelled() && !self.live.is_out_of_time() {
             return Turn::Stopped;
         }
         self.live.enter_phase(Phase::Encoding);
@@ -221,7 +235,8 @@ impl Attempt {
         Outcome {
             rounds: self.render.rounds(),
             error_estimate: self.render.error_estimate(),
-            stop_reason: self.render.stop_reason().map(Into::into),
+            // Where none was reached the service cut the last round off.
+            stop_reason: Some(self.render.stop_reason().unwrap_or("seconds").into()),
             stats: Some(self.render.stats()),
             history: self.live.history(),
             failure: None,

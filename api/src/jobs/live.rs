@@ -49,6 +49,10 @@ pub struct Progress {
 pub(super) struct Live {
     /// Stops the round that runs.
     pub(super) control: Control,
+    /// True once its time is over; its picture is then that of the rounds before.
+    out_of_time: AtomicBool,
+    /// True if somebody has looked at the picture since that was asked last.
+    looked_at: AtomicBool,
     state: Mutex<LiveState>,
 }
 
@@ -98,7 +102,23 @@ impl Live {
     }
 
     pub(super) fn preview(&self) -> Option<Arc<Preview>> {
+        self.looked_at.store(true, Ordering::Relaxed);
         lock(&self.state).preview.clone()
+    }
+
+    /// Whether somebody has looked at the picture since the last call.
+    pub(super) fn was_looked_at(&self) -> bool {
+        self.looked_at.swap(false, Ordering::Relaxed)
+    }
+
+    /// Stops the round that runs because the job has had its time.
+    pub(super) fn end_its_time(&self) {
+        self.out_of_time.store(true, Ordering::SeqCst);
+        self.control.cancel();
+    }
+
+    pub(super) fn is_out_of_time(&self) -> bool {
+        self.out_of_time.load(Ordering::SeqCst)
     }
 
     /// How far it is by now, the round that runs included.

@@ -1,8 +1,9 @@
 //! Jobs: what one is, and the one function that moves it from state to state.
 //!
 //! `store` keeps them in SQLite (`schema` has the tables, `sql` and `query` the statements), `files` keeps large scenes,
-//! checkpoints and pictures beside it, `assets` what scenes refer to, `keys` who may come; `retention` forgets, `scheduler` renders them (`attempt` is one render of one job), `live` is what is
-//! known of a running job between two writes, and [`service::Jobs`] is all of it for the handlers.
+//! checkpoints and pictures beside it, `assets` what scenes refer to, `keys` who may come; `retention` forgets, `scheduler` renders
+//! them (`attempt` is one render of one job, `watchdog` ends those that take too long), `live` is what is known of a running
+//! job between two writes, and [`service::Jobs`] is all of it for the handlers.
 
 mod answers;
 mod assets;
@@ -18,6 +19,7 @@ mod schema;
 pub mod service;
 mod sql;
 mod store;
+mod watchdog;
 
 pub use answers::Answer;
 pub(crate) use assets::is_sha256;

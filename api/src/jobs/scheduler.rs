@@ -7,11 +7,12 @@
 use super::assets::Assets;
 use super::attempt::{self, Attempt, Limits, Turn};
 use super::files::Files;
-use super::live::Registry;
+use super::live::{Live, Registry};
 use super::retention::Ended;
 use super::sql::{self, Claim, Outcome};
 use super::store::{Store, StoreError};
-use super::{Event, Failure, JobId, Owner, query, service::now_ms};
+use super::watchdog::Watchdog;
+use super::{Event, Failure, JobId, Owner, service::now_ms};
 use crate::engine::PlannedScene;
 use crate::metrics::Metrics;
 use serde_json::Value;
@@ -37,6 +38,7 @@ pub(super) struct Scheduler {
     pub(super) ended: mpsc::Sender<Ended>,
     pub(super) registry: Arc<Registry>,
     pub(super) pool: rayon::ThreadPool,
+    pub(super) watchdog: Watchdog,
     pub(super) concurrent: usize,
     pub(super) limits: Limits,
     pub(super) running: Vec<Attempt>,
@@ -77,14 +79,14 @@ impl Scheduler {
 
     fn begin(&mut self, claim: Claim) {
         let (id, fence, owner) = (claim.id, claim.attempt, claim.owner.clone());
+        // If it runs already, the claim of that attempt was not committed, and its result would be refused.
+        if let Some(index) = self.running.iter().position(|attempt| attempt.id == id) {
+            self.remove(index);
+        }
         let live = self.registry.enter(id);
         self.registry.announce(id);
         let begun = self.prepare(&claim).and_then(|(planned, report)| {
-            let record = move |db: &rusqlite::Connection| sql::record_plan(db, id, fence, &report);
-            // Nobody waits for it: a job that was cancelled meanwhile is stopped before its first round.
-            if let Err(error) = self.store.write_soon(record) {
-                tracing::warn!(job = %id, %error, "a plan was not recorded");
-            }
+            self.record_plan(&claim, &live, report);
             guarded(|| Attempt::begin(claim, planned, live, &self.files))
         });
         match begun {
@@ -100,10 +102,21 @@ impl Scheduler {
         }
     }
 
+    /// Nobody waits for it. Where it is refused, the job was cancelled before it was seen to run, or its claim was not
+    /// committed: the render stops.
+    fn record_plan(&self, claim: &Claim, live: &Arc<Live>, report: Value) {
+        let (id, fence, live) = (claim.id, claim.attempt, Arc::clone(live));
+        let record = move |db: &rusqlite::Connection| {
+            sql::record_plan(db, id, fence, &report).inspect_err(|_| live.control.cancel())
+        };
+        if let Err(error) = self.store.write_soon(record) {
+            tracing::warn!(job = %id, %error, "a plan was not recorded");
+        }
+    }
+
     fn prepare(&self, claim: &Claim) -> Result<(PlannedScene, Value), Failure> {
         let id = claim.id;
-        let kept = self.store.read_blocking(|db| query::scene(db, id)).ok().flatten();
-        let text = kept.map_or_else(|| self.files.scene(id), Ok).map_err(|error| {
+        let text = claim.scene.clone().map_or_else(|| self.files.scene(id), Ok).map_err(|error| {
             tracing::error!(job = %id, %error, "a scene could not be read");
             Failure::internal("The service could not read its scene.")
         })?;
@@ -120,10 +133,12 @@ impl Scheduler {
     }
 
     fn give_turn(&mut self, index: usize) {
-        let Self { pool, files, running, metrics, shares, .. } = self;
+        let Self { pool, files, running, metrics, shares, watchdog, limits, .. } = self;
         let attempt = &mut running[index];
         let before = attempt.seconds();
-        let turn = guarded(|| Ok(pool.install(|| attempt.take_turn(files, metrics))));
+        let (live, left) = (Arc::clone(&attempt.live), limits.max_seconds - before);
+        let round = || pool.install(|| attempt.take_turn(files, metrics));
+        let turn = guarded(|| Ok(watchdog.during(&live, left, round)));
         // A floor, so that rounds that take no time still pass the turn on.
         let took = (attempt.seconds() - before).max(1e-6);
         attempt.share += took;
@@ -220,6 +235,83 @@ fn panic_text(panic: &(dyn Any + Send)) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jobs::query;
+    use crate::jobs::sql::{NewJob, QueueLimits};
+    use std::path::Path;
+
+    fn scheduler(folder: &Path) -> Scheduler {
+        let store = Store::open(&folder.join("jobs.sqlite")).unwrap();
+        Scheduler {
+            files: Files::new(folder.join("jobs")).unwrap(),
+            assets: Assets::new(store.clone(), folder.join("assets")).unwrap(),
+            store,
+            metrics: Arc::default(),
+            ended: mpsc::channel().0,
+            registry: Arc::default(),
+            pool: rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap(),
+            watchdog: Watchdog::start().unwrap(),
+            concurrent: 1,
+            limits: Limits { max_seconds: 60.0, max_memory: 1 << 30, max_photons: 1 << 26 },
+            running: Vec::new(),
+            shares: HashMap::new(),
+        }
+    }
+
+    fn submit_and_claim(db: &rusqlite::Connection) -> Result<Claim, StoreError> {
+        sql::insert(db, &NewJob::sample(), QueueLimits { queued: 1, unfinished: 1 })?;
+        Ok(sql::claim(db, 0)?.expect("it has just been submitted"))
+    }
+
+    #[test]
+    fn a_job_can_start_while_its_submission_is_on_its_way_to_the_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        let scheduler = scheduler(folder.path());
+        let (gather, gathered) = mpsc::channel::<()>();
+        let (commit, committed) = mpsc::channel::<()>();
+        let (claims, claimed) = mpsc::channel();
+        // While the first holds the writer, the others come together into one group, which the last holds open.
+        let wait = |gate: mpsc::Receiver<()>| {
+            move |_: &rusqlite::Connection| {
+                let _ = gate.recv();
+                Ok(())
+            }
+        };
+        scheduler.store.write_soon(wait(gathered)).unwrap();
+        let submit = move |db: &rusqlite::Connection| {
+            claims.send(submit_and_claim(db)?).map_err(|_| StoreError::NotCommitted)
+        };
+        scheduler.store.write_soon(submit).unwrap();
+        scheduler.store.write_soon(wait(committed)).unwrap();
+        drop(gather);
+        let claim = claimed.recv().unwrap();
+        let unseen = scheduler.store.read_blocking(|db| query::scene(db, claim.id)).unwrap();
+        assert_eq!(unseen, None, "the submission is not on the disk");
+        assert!(scheduler.prepare(&claim).is_ok());
+        drop(commit);
+    }
+
+    #[test]
+    fn a_job_that_is_cancelled_between_its_claim_and_its_start_stops() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scheduler = scheduler(folder.path());
+        let claim = scheduler.store.write_blocking(submit_and_claim).unwrap();
+        let id = claim.id;
+        let cancel = move |db: &rusqlite::Connection| sql::apply(db, id, Event::Cancel, None, 0).map(drop);
+        scheduler.store.write_blocking(cancel).unwrap();
+        scheduler.begin(claim);
+        scheduler.store.write_blocking(|_| Ok(())).unwrap();
+        assert!(scheduler.running[0].live.control.is_cancelled());
+    }
+
+    #[test]
+    fn a_job_whose_claim_was_taken_back_runs_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scheduler = scheduler(folder.path());
+        let claim = scheduler.store.write_blocking(submit_and_claim).unwrap();
+        scheduler.begin(claim.clone());
+        scheduler.begin(claim);
+        assert_eq!(scheduler.running.len(), 1);
+    }
 
     #[test]
     fn a_panic_is_the_failure_of_its_job() {

@@ -10,6 +10,7 @@ use super::retention::{self, Policy};
 use super::scheduler::{Scheduler, Wake};
 use super::sql::{self, IdempotencyKey, NewJob, QueueLimits, Submitted};
 use super::store::Store;
+use super::watchdog::Watchdog;
 use super::{Event, Job, JobId, JobState, Owner, StoreError, query};
 use crate::config::Settings;
 use crate::engine::LoadedScene;
@@ -138,6 +139,7 @@ impl Jobs {
             ended,
             registry: Arc::clone(&registry),
             pool: render_pool(settings)?,
+            watchdog: Watchdog::start()?,
             concurrent: usize::from(settings.concurrent),
             limits: Limits {
                 max_seconds: settings.max_seconds,

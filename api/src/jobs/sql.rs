@@ -1,6 +1,6 @@
 //! The statements that change jobs, and what they are about.
 
-use super::query::{parsed, state_of};
+use super::query::{self, parsed, state_of};
 use super::{Event, Failure, JobId, JobState, Milestone, Owner, StoreError};
 use rusqlite::{Connection, OptionalExtension, named_params, params};
 use serde_json::Value;
@@ -250,7 +250,7 @@ pub(super) fn claim(db: &Connection, now_ms: i64) -> Result<Option<Claim>, Store
         .optional()?;
     let Some((id, owner)) = next else { return Ok(None) };
     let (_, attempt) = apply(db, id, Event::Start, None, now_ms)?;
-    Ok(Some(Claim { id, attempt, owner }))
+    Ok(Some(Claim { id, attempt, owner, scene: query::scene(db, id)? }))
 }
 
 /// A job that has just been started.
@@ -259,6 +259,9 @@ pub(super) struct Claim {
     pub id: JobId,
     pub attempt: u32,
     pub owner: Owner,
+    /// Its scene, unless it has a file of its own. It comes with the claim, since the submission may be on its way to
+    /// the disk still, where no other connection sees it.
+    pub scene: Option<String>,
 }
 
 /// Keeps the plan of a running attempt.
@@ -304,4 +307,45 @@ pub(super) fn delete(db: &Connection, id: JobId) -> Result<(), StoreError> {
 pub(super) fn ids(db: &Connection) -> Result<HashSet<String>, StoreError> {
     let mut statement = db.prepare("SELECT id FROM jobs")?;
     Ok(statement.query_map([], |row| row.get(0))?.collect::<Result<_, _>>()?)
+}
+
+#[cfg(test)]
+impl NewJob {
+    /// A sample that nobody has submitted yet.
+    pub(super) fn sample() -> Self {
+        let text = crate::samples::find("glass-ball").expect("it is embedded").text;
+        Self {
+            id: JobId::fresh(),
+            owner: Owner::anonymous(),
+            name: String::new(),
+            label: None,
+            size: [400, 300],
+            created_ms: 0,
+            scene: Some(text.into()),
+            bytes: text.len() as u64,
+            assets: Vec::new(),
+            idempotency: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::store::open_for_writing;
+
+    #[test]
+    fn what_an_attempt_out_of_date_brings_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let db = open_for_writing(&folder.path().join("jobs.sqlite")).unwrap();
+        insert(&db, &NewJob::sample(), QueueLimits { queued: 1, unfinished: 1 }).unwrap();
+        let old = claim(&db, 0).unwrap().unwrap();
+        apply(&db, old.id, Event::Requeue, Some(old.attempt), 0).unwrap();
+        let new = claim(&db, 0).unwrap().unwrap();
+        assert_eq!((old.id, old.attempt + 1), (new.id, new.attempt));
+        let end = |attempt| conclude(&db, (new.id, attempt), Event::Finish, &Outcome::default(), 0);
+        assert!(matches!(end(old.attempt), Err(StoreError::StaleAttempt)));
+        assert!(end(new.attempt).is_ok());
+        assert!(matches!(end(new.attempt), Err(StoreError::IllegalMove(JobState::Succeeded))), "once");
+    }
 }

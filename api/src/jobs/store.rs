@@ -236,3 +236,26 @@ fn within_savepoint<T>(
     connection.execute_batch(undo)?;
     outcome
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::sql::{self, NewJob, QueueLimits};
+
+    #[test]
+    fn the_journal_stays_small_however_much_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("jobs.sqlite");
+        let store = Store::open(&path).unwrap();
+        let bytes = |path: &Path| std::fs::metadata(path).unwrap().len();
+        let limits = QueueLimits { queued: u32::MAX, unfinished: u32::MAX };
+        for _ in 0..400 {
+            let job = NewJob { scene: Some(" ".repeat(60_000)), ..NewJob::sample() };
+            store.write_blocking(move |db| sql::insert(db, &job, limits).map(drop)).unwrap();
+            store.read_blocking(super::super::query::counts).unwrap();
+        }
+        assert!(bytes(&path) > 20_000_000, "it was written");
+        // SQLite carries it over every 4 MB.
+        assert!(bytes(&path.with_extension("sqlite-wal")) < 8_000_000);
+    }
+}

@@ -8,7 +8,7 @@ use axum::response::{IntoResponse, Response};
 use sha2::{Digest, Sha256};
 
 /// Name, type and content of each file.
-const FILES: [(&str, &str, &str); 14] = [
+const FILES: [(&str, &str, &str); 15] = [
     ("index.html", "text/html; charset=utf-8", include_str!("../../web/index.html")),
     ("page.css", "text/css; charset=utf-8", include_str!("../../web/page.css")),
     ("page.js", "text/javascript; charset=utf-8", include_str!("../../web/page.js")),
@@ -18,6 +18,7 @@ const FILES: [(&str, &str, &str); 14] = [
     ("nephroid.js", "text/javascript; charset=utf-8", include_str!("../../web/nephroid.js")),
     ("editor.js", "text/javascript; charset=utf-8", include_str!("../../web/editor.js")),
     ("complete.js", "text/javascript; charset=utf-8", include_str!("../../web/complete.js")),
+    ("exr.js", "text/javascript; charset=utf-8", include_str!("../../web/exr.js")),
     ("layers.js", "text/javascript; charset=utf-8", include_str!("../../web/layers.js")),
     ("docs.html", "text/html; charset=utf-8", include_str!("../../web/docs.html")),
     ("docs.css", "text/css; charset=utf-8", include_str!("../../web/docs.css")),

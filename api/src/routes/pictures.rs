@@ -68,12 +68,14 @@ pub(super) async fn get_error_map(
     send(&app, &caller, (&id, "error.png", PNG), &headers).await
 }
 
-/// The light of one class of paths; the job's links name those that it has
+/// A layer: the light of one class of paths, or what the scene named; `.png` as it is shown, `.exr` as linear radiance
+///
+/// The job's links name those that it has. The classes add up to the picture.
 #[utoipa::path(
     get, path = "/v1/renders/{id}/layers/{file}", tag = "pictures", security(("key" = [])),
     params(("id" = String, Path, format = Uuid), ("file" = String, Path, example = "caustic.png")),
     responses(
-        (status = OK, body = Vec<u8>, content_type = "image/png"), (status = 304), (status = 404),
+        (status = OK, content((Vec<u8> = "image/png"), (Vec<u8> = "image/x-exr"))), (status = 304), (status = 404),
         (status = 409, description = "The job has no picture in its state"), (status = 410)
     )
 )]
@@ -83,7 +85,8 @@ pub(super) async fn get_layer(
     Path((id, file)): Path<(String, String)>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    send(&app, &caller, (&id, &format!("layers/{file}"), PNG), &headers).await
+    let kind = if file.ends_with(".exr") { EXR } else { PNG };
+    send(&app, &caller, (&id, &format!("layers/{file}"), kind), &headers).await
 }
 
 /// The picture of the rounds that are finished so far
