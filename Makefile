@@ -1,4 +1,4 @@
-.PHONY: serve test bench browser gallery chart chart-quick openapi crash load fuzz image
+.PHONY: serve test bench browser gallery chart chart-quick stability openapi crash load fuzz image
 
 # Builds and starts the service on http://127.0.0.1:8080; settings as flags, e.g. `make serve ARGS="--threads 4"`.
 serve:
@@ -30,6 +30,10 @@ chart:
 # The same as a look of three minutes.
 chart-quick:
 	cargo run --release --package nephroid -- chart $(CHARTED) -o chart-quick --quick
+
+# Scenes in which methods of this kind break, by every method: stability/index.html.
+stability:
+	cargo run --release --package nephroid -- stability -o stability
 
 # The document of the service's addresses, after they have changed.
 openapi:

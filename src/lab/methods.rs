@@ -1,6 +1,7 @@
 //! Which methods can render a scene, and the settings that ask for them.
 
 use super::Task;
+use super::axis::plain;
 use crate::plan::Plan;
 use crate::scene::{Caustics, Scene};
 use serde_json::{Value, json};
@@ -11,6 +12,8 @@ const FIXED_RADIUS: f32 = 0.01;
 const NEAREST_MOST: f32 = 5.0;
 /// How many are.
 const NEAREST: u32 = 50;
+/// A list of more primitives would take minutes.
+const MOST_LISTED: usize = 3000;
 
 /// One way to render a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +25,7 @@ pub struct Method {
 }
 
 impl Method {
-    fn new(name: impl Into<String>, settings: Value) -> Self {
+    pub(super) fn new(name: impl Into<String>, settings: Value) -> Self {
         Self { name: name.into(), settings }
     }
 
@@ -47,23 +50,37 @@ pub fn methods(scene: &Scene, plan: &Plan, task: Task) -> Vec<Method> {
 }
 
 fn caustics(scene: &Scene) -> Vec<Method> {
-    let radius = FIXED_RADIUS * scene.geometry.bounds().radius();
-    let most = NEAREST_MOST * radius;
-    let mut methods = vec![
-        Method::default_of(Task::Picture),
-        Method::new("progressive radius", json!({ "radius": "progressive" })),
-        Method::new(format!("fixed radius {radius:.2} m"), json!({ "radius": { "fixed": radius } })),
-        Method::new(
-            format!("nearest {NEAREST}, at most {most:.2} m"),
-            json!({ "radius": { "nearest": NEAREST, "most": most } }),
-        ),
-        Method::new("aimed everywhere", json!({ "aiming": "everywhere" })),
-    ];
+    let mut methods = vec![Method::default_of(Task::Picture)];
+    methods.extend(classic_maps(scene));
+    methods.push(Method::new("aimed everywhere", json!({ "aiming": "everywhere" })));
     if all_can_be_met(scene) {
         methods.push(Method::new("backward: paths", json!({ "caustics": "backward" })));
     }
     methods.push(Method::new("forward: photons to the eye", json!({ "caustics": "forward" })));
     methods
+}
+
+/// The photon map with the radii of the literature.
+pub(super) fn classic_maps(scene: &Scene) -> [Method; 3] {
+    let radius = FIXED_RADIUS * scene.geometry.bounds().radius();
+    let most = NEAREST_MOST * radius;
+    [
+        Method::new("progressive radius", json!({ "radius": "progressive" })),
+        Method::new(
+            format!("fixed radius {} m", plain(radius.into())),
+            json!({ "radius": { "fixed": radius } }),
+        ),
+        Method::new(
+            format!("nearest {NEAREST}, at most {} m", plain(most.into())),
+            json!({ "radius": { "nearest": NEAREST, "most": most } }),
+        ),
+    ]
+}
+
+/// Structures that can find what rays meet in a scene; with very many primitives a list would take minutes.
+pub(super) fn structures(scene: &Scene) -> Vec<&'static str> {
+    let listed = scene.geometry.primitive_count() <= MOST_LISTED;
+    ["list", "grid", "bvh", "spheres"].into_iter().filter(|name| listed || *name != "list").collect()
 }
 
 /// True if a ray can meet each light by chance.

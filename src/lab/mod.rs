@@ -2,7 +2,7 @@
 //!
 //! A [`Subject`] is a scene that is rendered by many [`methods`]; its [`Reference`] is what they should come to. A
 //! [`Chart`] holds one [`Curve`] per method; [`svg`] draws it, [`page`] and [`table`] write it down. [`honesty()`] asks
-//! whether renders that stop by their own estimate are as good as they say.
+//! whether renders that stop by their own estimate are as good as they say; [`stability`] where methods break.
 
 pub mod axis;
 pub mod fit;
@@ -10,6 +10,7 @@ pub mod honesty;
 pub mod methods;
 pub mod page;
 pub mod run;
+pub mod stability;
 mod structures;
 mod subject;
 pub mod svg;
