@@ -81,6 +81,12 @@ fn looks(
 }
 
 impl Honesty {
+    /// The part of those that stopped which is within the target; `None` if none stopped.
+    #[must_use]
+    pub fn share(&self) -> Option<f64> {
+        (self.stopped > 0).then(|| f64::from(self.within) / f64::from(self.stopped))
+    }
+
     fn add(&mut self, looks: &[Look]) {
         let stop = looks.iter().find(|l| l.rounds >= LEAST_ROUNDS && l.estimate <= self.target);
         let Some(stop) = stop else {
@@ -112,6 +118,7 @@ mod tests {
         row.add(&[look(1, 1.0, 0.3, 0.08), look(2, 3.0, 0.09, 0.05)]);
         row.add(&[look(1, 1.0, 0.3, 0.3), look(2, 2.0, 0.2, 0.2)]);
         assert_eq!((row.stopped, row.within, row.not_reached), (2, 1, 1));
+        assert_eq!((row.share(), Honesty::default().share()), (Some(0.5), None));
         assert_eq!((row.worst, row.waste), (0.12, 3.0));
     }
 }

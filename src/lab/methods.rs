@@ -8,6 +8,8 @@ use serde_json::{Value, json};
 
 /// The radius of the classic photon maps, as a part of the radius around all that is in the scene.
 const FIXED_RADIUS: f32 = 0.01;
+/// The same of a map that is made for fine caustics: bias is what a wide radius costs.
+const FINE_RADIUS: f32 = 0.002;
 /// No photon further away than this many such radii is among the nearest.
 const NEAREST_MOST: f32 = 5.0;
 /// How many are.
@@ -35,6 +37,7 @@ impl Method {
         match task {
             Task::Picture => Self::new("default", json!({})),
             Task::DirectLight => Self::new("sobol (default)", json!({ "paths": "whitted" })),
+            Task::Complete => Self::new("Nephroid", json!({ "paths": "complete" })),
         }
     }
 }
@@ -45,6 +48,7 @@ pub fn methods(scene: &Scene, plan: &Plan, task: Task) -> Vec<Method> {
     match task {
         Task::Picture if plan.caustics == Some(Caustics::Photons) => caustics(scene),
         Task::DirectLight if scene.lights.iter().any(|l| matches!(l.kind(), "quad" | "disk")) => direct(),
+        Task::Complete => vec![Method::default_of(task)],
         Task::Picture | Task::DirectLight => Vec::new(),
     }
 }
@@ -52,6 +56,7 @@ pub fn methods(scene: &Scene, plan: &Plan, task: Task) -> Vec<Method> {
 fn caustics(scene: &Scene) -> Vec<Method> {
     let mut methods = vec![Method::default_of(Task::Picture)];
     methods.extend(classic_maps(scene));
+    methods.push(fixed(FINE_RADIUS * scene.geometry.bounds().radius()));
     methods.push(Method::new("aimed everywhere", json!({ "aiming": "everywhere" })));
     if all_can_be_met(scene) {
         methods.push(Method::new("backward: paths", json!({ "caustics": "backward" })));
@@ -66,15 +71,17 @@ pub(super) fn classic_maps(scene: &Scene) -> [Method; 3] {
     let most = NEAREST_MOST * radius;
     [
         Method::new("progressive radius", json!({ "radius": "progressive" })),
-        Method::new(
-            format!("fixed radius {} m", plain(radius.into())),
-            json!({ "radius": { "fixed": radius } }),
-        ),
+        fixed(radius),
         Method::new(
             format!("nearest {NEAREST}, at most {} m", plain(most.into())),
             json!({ "radius": { "nearest": NEAREST, "most": most } }),
         ),
     ]
+}
+
+fn fixed(radius: f32) -> Method {
+    let name = format!("fixed radius {} m", plain(radius.into()));
+    Method::new(name, json!({ "radius": { "fixed": radius } }))
 }
 
 /// Structures that can find what rays meet in a scene; with very many primitives a list would take minutes.

@@ -79,13 +79,19 @@ pub fn measure_reference(subject: &Subject<'_>, task: Task, budget: Budget) -> R
 
 /// Estimators without bias, and what asks for them.
 fn estimators(subject: &Subject<'_>, task: Task) -> Result<Vec<(String, Value)>, LabError> {
+    let with = |mut settings: Value| {
+        if task == Task::Complete {
+            settings["paths"] = json!("complete");
+        }
+        settings
+    };
     if task == Task::DirectLight {
         return Ok(vec![("eye samples".to_owned(), json!({ "paths": "whitted" }))]);
     }
-    let mut found = vec![("photons on pixels, not smoothed".to_owned(), json!({}))];
+    let mut found = vec![("photons on pixels, not smoothed".to_owned(), with(json!({})))];
     let scene = subject.scene(&json!({}), SEED)?;
     if all_can_be_met(&scene) && Plan::new(&scene).caustics == Some(Caustics::Photons) {
-        found.push(("backward paths".to_owned(), json!({ "caustics": "backward" })));
+        found.push(("backward paths".to_owned(), with(json!({ "caustics": "backward" }))));
     }
     Ok(found)
 }

@@ -51,8 +51,19 @@ pub enum End {
     Time,
     /// Its error came too near to that of the reference to be told.
     Reference,
+    /// There are no more pictures of another renderer.
+    Measured,
     /// The render failed.
     Failed(RenderError),
+}
+
+/// Where the line of another renderer comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// Rendered beside this one's, and compared with the same reference.
+    SameRun,
+    /// Measured before, as these words say: machine, date, and what differs.
+    Stored(String),
 }
 
 /// A method's error over time.
@@ -68,6 +79,8 @@ pub struct Curve {
     pub picture: Option<(Point, LinearImage)>,
     /// What the plan warns of.
     pub warnings: Vec<String>,
+    /// Where another renderer's line comes from; `None` for this one's.
+    pub peer: Option<Origin>,
 }
 
 impl Curve {
@@ -146,5 +159,5 @@ pub fn run_method(
             break End::Time;
         }
     };
-    Ok(Curve { method: method.clone(), points, end, picture, warnings })
+    Ok(Curve { method: method.clone(), points, end, picture, warnings, peer: None })
 }
