@@ -24,13 +24,17 @@ gallery:
 
 # Error against CPU seconds, every method, other renderers that bench/peers/install.sh has installed, whether renders keep
 # the errors they promise, times over the size of the work, and where methods fail: chart/index.html and stability/index.html.
+# Drawings in docs/speed-and-accuracy.md.
+FIGURES = ring-picture ring-direct ring-complete scaling-triangles
 CHARTED = scenes/glass-ball.json scenes/ring.json scenes/pool.json scenes/cornell.json scenes/lens.json scenes/drink.json
 PEER_SCENES = scenes/glass-ball.json scenes/ring.json scenes/pool.json scenes/cornell.json
 PEER_PYTHON = $(firstword $(wildcard bench/peers/venv/bin/python) python3)
 chart: stability
-	$(PEER_PYTHON) bench/peers/run.py $(PEER_SCENES) -o chart/peers --seconds $(or $(SECONDS_EACH),8)
-	cargo run --release --package nephroid -- chart $(CHARTED) -o chart --seconds $(or $(SECONDS_EACH),8) --scaling \
+	$(PEER_PYTHON) bench/peers/run.py $(PEER_SCENES) -o chart/peers --seconds $(or $(SECONDS_EACH),8) --width $(or $(WIDTH),200)
+	cargo run --release --package nephroid -- chart $(CHARTED) -o chart --seconds $(or $(SECONDS_EACH),8) --width $(or $(WIDTH),200) --scaling \
 		--peers chart/peers --honesty 100
+	mkdir -p docs/charts
+	cp $(foreach figure,$(FIGURES),chart/$(figure).svg) docs/charts/
 
 # The same as a look of three minutes; `PROFILE=` for the profile of the tests, which are compiled already.
 PROFILE = --release

@@ -26,7 +26,7 @@ def name():
     if not shutil.which('povray'):
         raise ImportError('no povray on the path')
     said = subprocess.run(['povray', '--version'], capture_output=True, text=True)
-    return 'POV-Ray ' + re.search(r'POV-Ray (\S+)', said.stderr + said.stdout).group(1)
+    return 'POV-Ray ' + re.search(r'POV-Ray (\d+\.\d+)', said.stderr + said.stdout).group(1)
 
 
 def vector(v):

@@ -38,6 +38,9 @@ def child(renderer, method, path, a):
     import numpy as np
     import scene
     loaded = scene.load(path)
+    width, height = loaded['size']
+    if a.width and a.width < width:
+        loaded['size'] = (a.width, height * a.width // width)
     module = importlib.import_module(renderer)
     base = '-'.join([loaded['name'], renderer, method.replace(' ', '-')])
     shots = []
@@ -64,6 +67,7 @@ def main():
     p.add_argument('scenes', nargs='+')
     p.add_argument('-o', '--output', default='chart/peers')
     p.add_argument('--seconds', type=float, default=20, help='CPU seconds of each method')
+    p.add_argument('--width', type=int, help='most pixels across')
     p.add_argument('--threads', type=int, default=os.cpu_count())
     p.add_argument('--renderer', action='append', choices=RENDERERS)
     p.add_argument('--child', nargs=2, help=argparse.SUPPRESS)
@@ -85,7 +89,7 @@ def main():
                 if (method, scene) in module.BLIND:
                     continue
                 command = [sys.executable, os.path.abspath(__file__), path, '-o', a.output, '--seconds', str(a.seconds),
-                           '--threads', str(a.threads), '--child', renderer, method]
+                           '--threads', str(a.threads), '--width', str(a.width or 0), '--child', renderer, method]
                 done = subprocess.run(command, capture_output=True, text=True)
                 results = [line[7:] for line in done.stdout.split('\n') if line.startswith('RESULT ')]
                 if not results:

@@ -10,7 +10,7 @@ use nephroid::lab::methods::methods;
 use nephroid::lab::table::{self, SceneResults, reference_json};
 use nephroid::lab::{
     Budget, Chart, Honesty, LabError, Reference, Scaling, Subject, Task, honesty, measure_reference, page,
-    peer_curve, run_method, scaling, svg, time_structures,
+    peer_curve, run_method, scaling, svg, time_structures, without_lamps,
 };
 use nephroid::plan::Plan;
 use nephroid::scene::{AssetSource, DirectoryAssets, ImageSettings};
@@ -36,9 +36,12 @@ pub(super) struct ChartArguments {
     /// Folder for charts, tables, the page and the references, which are used again.
     #[arg(short, long, value_name = "DIR", default_value = "chart")]
     output: PathBuf,
-    /// Small pictures and a second for each method: a look, not a measurement.
+    /// Pictures of 120 pixels across and a second for each method: a look, not a measurement.
     #[arg(long)]
     quick: bool,
+    /// Most pixels across; small pictures cost less for the same error. As the scene has it, if left out.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(8..=16_384))]
+    width: Option<u32>,
     /// CPU time of each method, s; a reference takes six times that.
     #[arg(long, default_value_t = 20.0)]
     seconds: f64,
@@ -109,7 +112,7 @@ impl ChartArguments {
     fn scene(&self, path: &Path, peers: &Peers) -> Result<(SceneResults, ImageSettings), Failure> {
         let (text, assets) = read(path)?;
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        let width = self.quick.then_some(QUICK.0);
+        let width = self.width.or(self.quick.then_some(QUICK.0));
         let wrong = |error| match error {
             LabError::Scene(errors) => Failure::Scene { path: path.to_owned(), errors },
             other => Failure::Lab(other),
@@ -165,7 +168,10 @@ impl ChartArguments {
         let file = |end: &str| self.output.join(format!("{}-{}-reference.{end}", subject.name, task.name()));
         let key = json!({ "scene": format!("{:016x}", subject.hash()), "budget": budget.reference,
                           "version": env!("CARGO_PKG_VERSION") });
-        if let Some(stored) = stored(&file("npy"), &file("json"), &key) {
+        if let Some(mut stored) = stored(&file("npy"), &file("json"), &key) {
+            if task == Task::Complete {
+                stored.mask = without_lamps(subject).map_err(Failure::Lab)?;
+            }
             return Ok(stored);
         }
         say(format!("{}, {}: reference", subject.name, task.name()));

@@ -2,7 +2,6 @@
 
 use super::run::Timed;
 use super::{LabError, Reference, Subject};
-use crate::compare::compare;
 use serde_json::json;
 
 /// The errors that are asked for.
@@ -68,7 +67,7 @@ fn looks(
     let mut looks = Vec::new();
     loop {
         timed.run_to_milestone()?;
-        let squared = compare(&timed.render.image(), &reference.image, None)?.relmse;
+        let squared = reference.judge(&timed.render.image())?.relmse;
         // The reference's own error is independent of the render's, so that squares subtract.
         let truth = (squared - reference.relative_error.powi(2)).max(0.0).sqrt();
         let estimate = timed.render.error_estimate().map_or(f64::INFINITY, f64::from);

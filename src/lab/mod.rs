@@ -24,7 +24,7 @@ mod reference;
 pub use honesty::{Honesty, honesty};
 pub use methods::Method;
 pub use peers::{PeerRun, Shot, peer_curve};
-pub use reference::{Reference, Rival, measure_reference};
+pub use reference::{Reference, Rival, measure_reference, without_lamps};
 pub use run::{Budget, Curve, End, Origin, Point, run_method};
 pub use scaling::{Scaling, Series};
 pub use structures::{Timing, time_structures};

@@ -63,6 +63,9 @@ fn reference_words(html: &mut String, reference: &Reference) {
         reference.cpu,
         percent(reference.error)
     );
+    if reference.mask.is_some() {
+        html.push_str(" Pixels that show a lamp, straight, in a mirror or through glass, are left out.");
+    }
     if let Some(rival) = &reference.rival {
         let _ = write!(
             html,

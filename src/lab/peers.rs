@@ -3,7 +3,6 @@
 
 use super::run::OVER_REFERENCE;
 use super::{Curve, End, LabError, Method, Origin, Point, Reference};
-use crate::compare::compare;
 use crate::image_io::LinearImage;
 use serde_json::json;
 
@@ -32,7 +31,7 @@ pub struct PeerRun {
 pub fn peer_curve(run: PeerRun, reference: &Reference, equal_time: f64) -> Result<Curve, LabError> {
     let (mut points, mut picture, mut end) = (Vec::new(), None, End::Measured);
     for (index, Shot { cpu, image }) in run.shots.into_iter().enumerate() {
-        let error = compare(&image, &reference.image, None)?.rel_rmse;
+        let error = reference.judge(&image)?.rel_rmse;
         if error < OVER_REFERENCE * reference.error {
             end = End::Reference;
             break;

@@ -2,7 +2,6 @@
 
 use super::fit::{slope, tail, time_to_reach};
 use super::{LabError, Method, Reference, Subject};
-use crate::compare::compare;
 use crate::image_io::LinearImage;
 use crate::plan::Plan;
 use crate::render::{Control, Render, RenderError, is_milestone};
@@ -84,10 +83,10 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// The exponent of the error over the later half.
+    /// The exponent of the error over the later half; of fewer than three points it would say little.
     #[must_use]
     pub fn slope(&self) -> Option<f64> {
-        slope(tail(&self.points))
+        (self.points.len() > 2).then(|| slope(tail(&self.points)))?
     }
 
     /// CPU seconds to an error.
@@ -146,7 +145,7 @@ pub fn run_method(
             break End::Failed(error);
         }
         let image = timed.render.image();
-        let error = compare(&image, &reference.image, None)?.rel_rmse;
+        let error = reference.judge(&image)?.rel_rmse;
         if error < OVER_REFERENCE * reference.error {
             break End::Reference;
         }

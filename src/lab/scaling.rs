@@ -44,7 +44,7 @@ pub struct Scaling {
 /// # Errors
 /// If a scene cannot be rendered.
 pub fn measure_scaling(most: f64) -> Result<Vec<Scaling>, LabError> {
-    Ok(vec![primitives(most)?, photons(most)?, lights(most)?, pixels(most)?, threads()?])
+    Ok(vec![primitives(most)?, photons(most)?, lights(most)?, pixels(most)?, threads(most)?])
 }
 
 /// Powers of ten, and those in the middle between them.
@@ -199,19 +199,20 @@ fn pixels(most: f64) -> Result<Scaling, LabError> {
 }
 
 /// The same render on more threads, by the clock.
-fn threads() -> Result<Scaling, LabError> {
+fn threads(most: f64) -> Result<Scaling, LabError> {
+    let (width, height) = if most < 0.5 { (160, 120) } else { (400, 300) };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let mut series = ["seconds by the clock", "CPU seconds"].map(|name| Series { name, points: Vec::new() });
     for count in (0..).map(|k| 1 << k).take_while(|count| *count <= cores) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
         let Ok(pool) = pool else { break };
-        let spent = pool.install(|| spend(&scene(400, 300), 8, |_| ()))?;
+        let spent = pool.install(|| spend(&scene(width, height), 8, |_| ()))?;
         series[0].points.push((count as f64, spent.wall));
         series[1].points.push((count as f64, spent.cpu));
     }
     Ok(Scaling {
         over: "threads",
-        scene: "the glass ball, 400 × 300 pixels, 8 rounds",
+        scene: "the glass ball, 8 rounds",
         unit: "seconds",
         theory: "1/n by the clock, and CPU time that stays",
         series: series.into(),

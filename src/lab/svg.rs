@@ -5,7 +5,7 @@ use super::run::OVER_REFERENCE;
 use super::{Chart, Curve, Origin};
 use std::fmt::Write;
 
-const WIDTH: f64 = 980.0;
+const WIDTH: f64 = 1080.0;
 const HEIGHT: f64 = 520.0;
 /// Left, right, top and bottom of the plot; the legend stands to the right.
 const BOX: [f64; 4] = [76.0, 640.0, 56.0, 456.0];

@@ -129,7 +129,7 @@ pub fn reference_json(reference: &Reference) -> Value {
     })
 }
 
-/// A reference that was written down, with its picture.
+/// A reference that was written down, with its picture; of all pixels.
 #[must_use]
 pub fn reference_from(json: &Value, image: LinearImage) -> Option<Reference> {
     let number = |value: &Value, key: &str| value[key].as_f64();
@@ -150,6 +150,7 @@ pub fn reference_from(json: &Value, image: LinearImage) -> Option<Reference> {
         rounds: json["rounds"].as_u64()? as u32,
         cpu: number(json, "cpu_seconds")?,
         rival: rival(&json["rival"]),
+        mask: None,
     })
 }
 
