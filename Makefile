@@ -1,4 +1,4 @@
-.PHONY: serve test bench browser gallery chart chart-quick openapi crash load fuzz image
+.PHONY: serve test bench browser gallery chart chart-quick stability openapi crash load fuzz image
 
 # Builds and starts the service on http://127.0.0.1:8080; settings as flags, e.g. `make serve ARGS="--threads 4"`.
 serve:
@@ -22,14 +22,28 @@ browser:
 gallery:
 	cargo run --release --example gallery -- $(SCENES)
 
-# Error against CPU seconds, every method, and whether renders keep the errors they promise: chart/index.html.
+# Error against CPU seconds, every method, other renderers that bench/peers/install.sh has installed, whether renders keep
+# the errors they promise, times over the size of the work, and where methods fail: chart/index.html and stability/index.html.
+# Drawings in docs/speed-and-accuracy.md.
+FIGURES = ring-picture ring-direct ring-complete scaling-triangles
 CHARTED = scenes/glass-ball.json scenes/ring.json scenes/pool.json scenes/cornell.json scenes/lens.json scenes/drink.json
-chart:
-	cargo run --release --package nephroid -- chart $(CHARTED) -o chart --honesty 100
+PEER_SCENES = scenes/glass-ball.json scenes/ring.json scenes/pool.json scenes/cornell.json
+PEER_PYTHON = $(firstword $(wildcard bench/peers/venv/bin/python) python3)
+chart: stability
+	$(PEER_PYTHON) bench/peers/run.py $(PEER_SCENES) -o chart/peers --seconds $(or $(SECONDS_EACH),8) --width $(or $(WIDTH),200)
+	cargo run --release --package nephroid -- chart $(CHARTED) -o chart --seconds $(or $(SECONDS_EACH),8) --width $(or $(WIDTH),200) --scaling \
+		--peers chart/peers --honesty 100
+	mkdir -p docs/charts
+	cp $(foreach figure,$(FIGURES),chart/$(figure).svg) docs/charts/
 
-# The same as a look of three minutes.
+# The same as a look of three minutes; `PROFILE=` for the profile of the tests, which are compiled already.
+PROFILE = --release
 chart-quick:
-	cargo run --release --package nephroid -- chart $(CHARTED) -o chart-quick --quick
+	cargo run $(PROFILE) --package nephroid -- chart $(CHARTED) -o chart-quick --quick --scaling
+
+# Scenes in which methods of this kind break, by every method: stability/index.html.
+stability:
+	cargo run --release --package nephroid -- stability -o stability
 
 # The document of the service's addresses, after they have changed.
 openapi:

@@ -5,10 +5,13 @@ mod check;
 mod compare;
 mod convert;
 mod files;
+mod peers;
 mod plan;
+mod png;
 mod progress;
 mod render;
 mod schema;
+mod stability;
 
 use clap::{Parser, Subcommand};
 use nephroid::scene::SceneErrors;
@@ -34,6 +37,8 @@ enum Command {
     Compare(compare::CompareArguments),
     /// Chart the error of every method against its CPU time.
     Chart(chart::ChartArguments),
+    /// Render the scenes in which methods of this kind break, by every method, and table what happened.
+    Stability(stability::StabilityArguments),
     /// Turn a model in binary glTF into a scene file.
     Convert(convert::ConvertArguments),
     /// Print the JSON Schema of scene files.
@@ -48,6 +53,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Check(arguments) => check::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Chart(arguments) => chart::run(&arguments),
+        Command::Stability(arguments) => stability::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Schema(arguments) => schema::run(&arguments),
     }

@@ -2,7 +2,6 @@
 
 use super::run::Timed;
 use super::{LabError, Reference, Subject};
-use crate::compare::compare;
 use serde_json::json;
 
 /// The errors that are asked for.
@@ -68,7 +67,7 @@ fn looks(
     let mut looks = Vec::new();
     loop {
         timed.run_to_milestone()?;
-        let squared = compare(&timed.render.image(), &reference.image, None)?.relmse;
+        let squared = reference.judge(&timed.render.image())?.relmse;
         // The reference's own error is independent of the render's, so that squares subtract.
         let truth = (squared - reference.relative_error.powi(2)).max(0.0).sqrt();
         let estimate = timed.render.error_estimate().map_or(f64::INFINITY, f64::from);
@@ -81,6 +80,12 @@ fn looks(
 }
 
 impl Honesty {
+    /// The part of those that stopped which is within the target; `None` if none stopped.
+    #[must_use]
+    pub fn share(&self) -> Option<f64> {
+        (self.stopped > 0).then(|| f64::from(self.within) / f64::from(self.stopped))
+    }
+
     fn add(&mut self, looks: &[Look]) {
         let stop = looks.iter().find(|l| l.rounds >= LEAST_ROUNDS && l.estimate <= self.target);
         let Some(stop) = stop else {
@@ -112,6 +117,7 @@ mod tests {
         row.add(&[look(1, 1.0, 0.3, 0.08), look(2, 3.0, 0.09, 0.05)]);
         row.add(&[look(1, 1.0, 0.3, 0.3), look(2, 2.0, 0.2, 0.2)]);
         assert_eq!((row.stopped, row.within, row.not_reached), (2, 1, 1));
+        assert_eq!((row.share(), Honesty::default().share()), (Some(0.5), None));
         assert_eq!((row.worst, row.waste), (0.12, 3.0));
     }
 }

@@ -1,15 +1,19 @@
 //! The lab: every method that can render a scene, its error against a reference over CPU seconds.
 //!
 //! A [`Subject`] is a scene that is rendered by many [`methods`]; its [`Reference`] is what they should come to. A
-//! [`Chart`] holds one [`Curve`] per method; [`svg`] draws it, [`page`] and [`table`] write it down. [`honesty()`] asks
-//! whether renders that stop by their own estimate are as good as they say.
+//! [`Chart`] holds one [`Curve`] per method; [`svg`] draws it, [`page`] and [`table`] write it down; [`peers`] puts other renderers on it. [`scaling`] is time over
+//! the size of the work. [`honesty()`] asks
+//! whether renders that stop by their own estimate are as good as they say; [`stability`] where methods break.
 
 pub mod axis;
 pub mod fit;
 pub mod honesty;
 pub mod methods;
 pub mod page;
+pub mod peers;
 pub mod run;
+pub mod scaling;
+pub mod stability;
 mod structures;
 mod subject;
 pub mod svg;
@@ -19,8 +23,10 @@ mod reference;
 
 pub use honesty::{Honesty, honesty};
 pub use methods::Method;
-pub use reference::{Reference, Rival, measure_reference};
-pub use run::{Budget, Curve, End, Point, run_method};
+pub use peers::{PeerRun, Shot, peer_curve};
+pub use reference::{Reference, Rival, measure_reference, without_lamps};
+pub use run::{Budget, Curve, End, Origin, Point, run_method};
+pub use scaling::{Scaling, Series};
 pub use structures::{Timing, time_structures};
 pub use subject::Subject;
 
@@ -49,6 +55,8 @@ pub enum Task {
     Picture,
     /// Direct light alone, `whitted`.
     DirectLight,
+    /// All paths of light, beside other renderers, which know no less.
+    Complete,
 }
 
 impl Task {
@@ -58,6 +66,7 @@ impl Task {
         match self {
             Self::Picture => "picture",
             Self::DirectLight => "direct",
+            Self::Complete => "complete",
         }
     }
 
@@ -67,6 +76,7 @@ impl Task {
         match self {
             Self::Picture => "the whole picture, caustics by several methods",
             Self::DirectLight => "direct light, area lights sampled in several ways",
+            Self::Complete => "all paths of light, beside other renderers",
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::axis::escaped;
 use super::table::{LEVELS, SceneResults, end};
-use super::{Chart, Curve, LabError, Reference, Task, Timing, svg};
+use super::{Chart, Curve, LabError, Origin, Reference, Scaling, Timing, scaling, svg};
 use crate::compare::flip::ldr_flip;
 use crate::image_io::{LinearImage, encode_png};
 use crate::scene::ImageSettings;
@@ -20,7 +20,7 @@ const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:1100px;ma
 ///
 /// # Errors
 /// If a picture cannot be encoded.
-pub fn page(results: &[(SceneResults, ImageSettings)]) -> Result<String, LabError> {
+pub fn page(results: &[(SceneResults, ImageSettings)], scalings: &[Scaling]) -> Result<String, LabError> {
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Speed against accuracy</title>\
          <style>{STYLE}</style>\n<h1>Speed against accuracy</h1>\n<p>Each line is one method in one render that goes \
@@ -38,8 +38,19 @@ pub fn page(results: &[(SceneResults, ImageSettings)]) -> Result<String, LabErro
         structures(&mut html, &scene.timings);
         honesty(&mut html, scene);
     }
+    growth(&mut html, scalings);
     html.push_str("</html>\n");
     Ok(html)
+}
+
+fn growth(html: &mut String, scalings: &[Scaling]) {
+    if scalings.is_empty() {
+        return;
+    }
+    html.push_str("<h2>Time over the size of the work</h2>\n");
+    for measured in scalings {
+        let _ = writeln!(html, "{}<p>Expected: {}.</p>", scaling::draw(measured), measured.theory);
+    }
 }
 
 fn reference_words(html: &mut String, reference: &Reference) {
@@ -52,6 +63,9 @@ fn reference_words(html: &mut String, reference: &Reference) {
         reference.cpu,
         percent(reference.error)
     );
+    if reference.mask.is_some() {
+        html.push_str(" Pixels that show a lamp, straight, in a mirror or through glass, are left out.");
+    }
     if let Some(rival) = &reference.rival {
         let _ = write!(
             html,
@@ -113,6 +127,9 @@ fn picture(
         point.cpu,
         percent(point.error)
     );
+    if curve.peer == Some(Origin::SameRun) {
+        words.push_str(", rendered in the same run");
+    }
     for warning in &curve.warnings {
         let _ = write!(words, "<br>{}", escaped(warning));
     }
@@ -149,25 +166,25 @@ fn structures(html: &mut String, timings: &[Timing]) {
 }
 
 fn honesty(html: &mut String, scene: &SceneResults) {
-    let (rows, chart) = (&scene.honesty, scene.charts.iter().find(|chart| chart.task == Task::Picture));
-    let Some(chart) = chart.filter(|_| !rows.is_empty()) else { return };
+    let Some((rows, own)) = &scene.honesty else { return };
     let _ = write!(
         html,
-        "<h3>Renders that stop by their own estimate</h3>\n<p>In this measure the reference's own error is {}, which \
+        "<h3>Renders that stop by their own estimate</h3>\n<p>Small pictures, many seeds. In this measure the reference's own error is {}, which \
          is taken off in squares; rows that ask for less than three times as much are not to be trusted.</p>",
-        percent(chart.reference.relative_error)
+        percent(*own)
     );
     html.push_str(
         "\n<table><tr><th>error asked for</th><th>stopped</th>\
-         <th>within it</th><th>not reached</th><th>largest error</th><th>time over need</th></tr>\n",
+         <th>within it</th><th>share</th><th>not reached</th><th>largest error</th><th>time over need</th></tr>\n",
     );
     for row in rows {
         let _ = writeln!(
             html,
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td></tr>",
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td></tr>",
             percent(row.target),
             row.stopped,
             row.within,
+            row.share().map_or_else(|| "–".to_owned(), percent),
             row.not_reached,
             percent(row.worst),
             row.waste

@@ -3,14 +3,18 @@
 use super::methods::all_can_be_met;
 use super::run::Timed;
 use super::{Budget, LabError, Subject, Task};
-use crate::compare::{Comparison, compare};
+use crate::compare::{CompareError, Comparison, compare};
 use crate::image_io::LinearImage;
+use crate::light_path::PathClass;
 use crate::plan::Plan;
 use crate::scene::Caustics;
 use serde_json::{Value, json};
 
 /// Seed of the reference.
 const SEED: u64 = 0x5ee_dbee;
+
+/// Rounds in which a lamp that is seen anywhere is found.
+const LAMP_ROUNDS: u32 = 32;
 
 /// Each estimator is tried for this part of the budget; the better one goes on.
 const TRIAL: f64 = 0.125;
@@ -33,6 +37,8 @@ pub struct Reference {
     pub cpu: f64,
     /// The estimator that was tried beside it.
     pub rival: Option<Rival>,
+    /// The pixels that are compared, if not all: see [`without_lamps`].
+    pub mask: Option<Vec<bool>>,
 }
 
 /// An independent estimate of the same picture.
@@ -49,24 +55,61 @@ pub struct Rival {
     pub mean_ratio: f64,
 }
 
+impl Reference {
+    /// How a picture differs from it.
+    ///
+    /// # Errors
+    /// If it has another size, or is not finite.
+    pub fn judge(&self, image: &LinearImage) -> Result<Comparison, CompareError> {
+        compare(image, &self.image, self.mask.as_deref())
+    }
+}
+
+/// The pixels of a complete picture that are compared with other renderers: those that show no lamp, neither straight nor
+/// in mirrors or through glass, nor lie beside one that does. A lamp is hundreds of times as bright as what it lights, so that
+/// the error of all others would be that of its outline alone. `None`, for all, if that leaves less than a tenth.
+///
+/// # Errors
+/// If the scene cannot be rendered.
+pub fn without_lamps(subject: &Subject<'_>) -> Result<Option<Vec<bool>>, LabError> {
+    let mut timed = Timed::new(subject.scene(&json!({ "paths": "LS*E" }), SEED)?);
+    while timed.render.rounds() < LAMP_ROUNDS {
+        timed.run_to_milestone()?;
+    }
+    let LinearImage { width, height, pixels } = timed.render.layer(PathClass::Emitted);
+    let (width, height) = (width as usize, height as usize);
+    let dark = |x: usize, y: usize| pixels[y * width + x] == [0.0; 3];
+    let mask: Vec<bool> = (0..width * height)
+        .map(|i| {
+            let (x, y) = (i % width, i / width);
+            let (columns, rows) =
+                (x.saturating_sub(1)..=(x + 1).min(width - 1), y.saturating_sub(1)..=(y + 1).min(height - 1));
+            rows.into_iter().all(|y| columns.clone().all(|x| dark(x, y)))
+        })
+        .collect();
+    let kept = mask.iter().filter(|kept| **kept).count();
+    Ok((10 * kept >= mask.len()).then_some(mask))
+}
+
 /// Renders a reference within the budget.
 ///
 /// # Errors
 /// If the scene cannot be rendered, or is black.
 pub fn measure_reference(subject: &Subject<'_>, task: Task, budget: Budget) -> Result<Reference, LabError> {
+    let mask = if task == Task::Complete { without_lamps(subject)? } else { None };
     let mut trials = Vec::new();
     for (name, settings) in estimators(subject, task)? {
         let mut timed = Timed::new(subject.scene(&settings, SEED)?);
         run(&mut timed, TRIAL * budget.reference)?;
-        trials.push((name, summary(&timed)?, timed));
+        trials.push((name, summary(&timed, mask.as_deref())?, timed));
     }
     trials.sort_by(|a, b| a.1.error.total_cmp(&b.1.error));
     let mut trials = trials.into_iter();
     let Some((name, _, mut timed)) = trials.next() else { return Err(LabError::NotAnObject) };
     run(&mut timed, budget.reference)?;
-    let mut reference = Reference { estimator: name, ..summary(&timed)? };
+    let mut reference = Reference { estimator: name, ..summary(&timed, mask.as_deref())? };
     if let Some((name, other, _)) = trials.next() {
-        let against = compare(&other.image, &reference.image, None)?;
+        let against = compare(&other.image, &reference.image, mask.as_deref())?;
         reference.rival = Some(Rival {
             estimator: name,
             error: other.error,
@@ -79,13 +122,19 @@ pub fn measure_reference(subject: &Subject<'_>, task: Task, budget: Budget) -> R
 
 /// Estimators without bias, and what asks for them.
 fn estimators(subject: &Subject<'_>, task: Task) -> Result<Vec<(String, Value)>, LabError> {
+    let with = |mut settings: Value| {
+        if task == Task::Complete {
+            settings["paths"] = json!("complete");
+        }
+        settings
+    };
     if task == Task::DirectLight {
         return Ok(vec![("eye samples".to_owned(), json!({ "paths": "whitted" }))]);
     }
-    let mut found = vec![("photons on pixels, not smoothed".to_owned(), json!({}))];
+    let mut found = vec![("photons on pixels, not smoothed".to_owned(), with(json!({})))];
     let scene = subject.scene(&json!({}), SEED)?;
     if all_can_be_met(&scene) && Plan::new(&scene).caustics == Some(Caustics::Photons) {
-        found.push(("backward paths".to_owned(), json!({ "caustics": "backward" })));
+        found.push(("backward paths".to_owned(), with(json!({ "caustics": "backward" }))));
     }
     Ok(found)
 }
@@ -97,13 +146,13 @@ fn run(timed: &mut Timed, seconds: f64) -> Result<(), LabError> {
     Ok(())
 }
 
-fn summary(timed: &Timed) -> Result<Reference, LabError> {
+fn summary(timed: &Timed, mask: Option<&[bool]>) -> Result<Reference, LabError> {
     let [a, b] = timed.render.raw_halves();
     let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
     let pixels = a.pixels.iter().zip(&b.pixels).map(mean).collect();
     let image = LinearImage { width: a.width, height: a.height, pixels };
     // The mean differs from a half by half the halves' difference.
-    let Comparison { rel_rmse, relmse, .. } = compare(&a, &image, None)?;
+    let Comparison { rel_rmse, relmse, .. } = compare(&a, &image, mask)?;
     Ok(Reference {
         image,
         error: rel_rmse,
@@ -112,5 +161,6 @@ fn summary(timed: &Timed) -> Result<Reference, LabError> {
         rounds: timed.render.rounds(),
         cpu: timed.cpu,
         rival: None,
+        mask: mask.map(<[bool]>::to_vec),
     })
 }

@@ -2,7 +2,6 @@
 
 use super::fit::{slope, tail, time_to_reach};
 use super::{LabError, Method, Reference, Subject};
-use crate::compare::compare;
 use crate::image_io::LinearImage;
 use crate::plan::Plan;
 use crate::render::{Control, Render, RenderError, is_milestone};
@@ -51,8 +50,19 @@ pub enum End {
     Time,
     /// Its error came too near to that of the reference to be told.
     Reference,
+    /// There are no more pictures of another renderer.
+    Measured,
     /// The render failed.
     Failed(RenderError),
+}
+
+/// Where the line of another renderer comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// Rendered beside this one's, and compared with the same reference.
+    SameRun,
+    /// Measured before, as these words say: machine, date, and what differs.
+    Stored(String),
 }
 
 /// A method's error over time.
@@ -68,13 +78,15 @@ pub struct Curve {
     pub picture: Option<(Point, LinearImage)>,
     /// What the plan warns of.
     pub warnings: Vec<String>,
+    /// Where another renderer's line comes from; `None` for this one's.
+    pub peer: Option<Origin>,
 }
 
 impl Curve {
-    /// The exponent of the error over the later half.
+    /// The exponent of the error over the later half; of fewer than three points it would say little.
     #[must_use]
     pub fn slope(&self) -> Option<f64> {
-        slope(tail(&self.points))
+        (self.points.len() > 2).then(|| slope(tail(&self.points)))?
     }
 
     /// CPU seconds to an error.
@@ -133,7 +145,7 @@ pub fn run_method(
             break End::Failed(error);
         }
         let image = timed.render.image();
-        let error = compare(&image, &reference.image, None)?.rel_rmse;
+        let error = reference.judge(&image)?.rel_rmse;
         if error < OVER_REFERENCE * reference.error {
             break End::Reference;
         }
@@ -146,5 +158,5 @@ pub fn run_method(
             break End::Time;
         }
     };
-    Ok(Curve { method: method.clone(), points, end, picture, warnings })
+    Ok(Curve { method: method.clone(), points, end, picture, warnings, peer: None })
 }

@@ -1,11 +1,10 @@
 //! The structures that find the nearest hit: the picture is the same, only the time differs.
 
+use super::methods::structures;
 use super::run::Timed;
 use super::{LabError, Subject};
 use serde_json::json;
 
-/// With more primitives a list would take minutes.
-const MOST_LISTED: usize = 3000;
 /// The quickest of so many renders counts: the others were disturbed.
 const REPEATS: usize = 3;
 
@@ -23,12 +22,8 @@ pub struct Timing {
 /// # Errors
 /// If the scene cannot be rendered.
 pub fn time_structures(subject: &Subject<'_>) -> Result<Vec<Timing>, LabError> {
-    let small = subject.scene(&json!({}), 1)?.geometry.primitive_count() <= MOST_LISTED;
     let mut timings = Vec::new();
-    for structure in ["list", "grid", "bvh", "spheres"] {
-        if structure == "list" && !small {
-            continue;
-        }
+    for structure in structures(&subject.scene(&json!({}), 1)?) {
         let mut cpu = f64::INFINITY;
         for _ in 0..REPEATS {
             let mut timed = Timed::new(subject.scene(&json!({ "structure": structure }), 1)?);

@@ -2,10 +2,10 @@
 
 use super::axis::{LogAxis, escaped, plain};
 use super::run::OVER_REFERENCE;
-use super::{Chart, Curve};
+use super::{Chart, Curve, Origin};
 use std::fmt::Write;
 
-const WIDTH: f64 = 980.0;
+const WIDTH: f64 = 1080.0;
 const HEIGHT: f64 = 520.0;
 /// Left, right, top and bottom of the plot; the legend stands to the right.
 const BOX: [f64; 4] = [76.0, 640.0, 56.0, 456.0];
@@ -14,19 +14,19 @@ pub const INK: &str = "#1d2126";
 /// Colour of the lines at the ticks.
 pub const GRID: &str = "#d8d3c8";
 /// Colours that stay apart for most eyes (Okabe and Ito), the default first.
-const COLOURS: [&str; 8] =
+pub(super) const COLOURS: [&str; 8] =
     ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9", "#000000", "#7a7f87"];
+
+/// Dashes of other renderers' lines.
+const DASHES: &str = " stroke-dasharray=\"8 5\"";
+/// Dashes of lines that were measured elsewhere.
+const SHORT_DASHES: &str = " stroke-dasharray=\"2 4\"";
 
 /// The chart as a picture; colours are attributes, so that no policy forbids them.
 #[must_use]
 pub fn draw(chart: &Chart) -> String {
     let title = escaped(&format!("{}: {}", chart.scene, chart.task.title()));
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" \
-         height=\"{HEIGHT}\" role=\"img\" font-family=\"system-ui, sans-serif\" font-size=\"14\" fill=\"{INK}\">\n\
-         <title>{title}: error against CPU seconds</title>\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"#fffdf9\"/>\n"
-    );
+    let mut svg = head((WIDTH, HEIGHT), &format!("{title}: error against CPU seconds"));
     text(&mut svg, (BOX[0], 30.0), "start", &title);
     let all = || chart.curves.iter().flat_map(|curve| &curve.points);
     if all().next().is_none() {
@@ -38,6 +38,9 @@ pub fn draw(chart: &Chart) -> String {
         let y = LogAxis::around(errors.into_iter(), BOX[3], BOX[2]);
         axes(&mut svg, &x, &y);
         floor_line(&mut svg, y.at(floor));
+        let first =
+            all().fold((f64::INFINITY, 0.0_f64), |(cpu, error), p| (cpu.min(p.cpu), error.max(p.error)));
+        guide(&mut svg, first, (&x, &y));
         for (index, curve) in chart.curves.iter().enumerate() {
             draw_curve(&mut svg, curve, COLOURS[index % COLOURS.len()], (&x, &y));
         }
@@ -45,6 +48,15 @@ pub fn draw(chart: &Chart) -> String {
     legend(&mut svg, &chart.curves);
     svg.push_str("</svg>\n");
     svg
+}
+
+/// The beginning of a picture of this size; colours are attributes, so that no policy forbids them.
+pub(super) fn head((width, height): (f64, f64), title: &str) -> String {
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
+         height=\"{height}\" role=\"img\" font-family=\"system-ui, sans-serif\" font-size=\"14\" fill=\"{INK}\">\n\
+         <title>{title}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#fffdf9\"/>\n"
+    )
 }
 
 fn axes(svg: &mut String, x: &LogAxis, y: &LogAxis) {
@@ -72,12 +84,43 @@ fn floor_line(svg: &mut String, y: f64) {
     text(svg, (right + 16.0, y + 4.0), "start", "three times the reference's own error");
 }
 
+/// The rate of independent samples, from the upper left.
+fn guide(svg: &mut String, (cpu, error): (f64, f64), (x, y): (&LogAxis, &LogAxis)) {
+    let [left, right, top, bottom] = BOX;
+    let at = |cpu_now: f64| (x.at(cpu_now), y.at(error * (cpu / cpu_now).sqrt()));
+    // A straight line, followed in small steps to where it leaves the plot.
+    let inside = |(x, y): (f64, f64)| (left..=right).contains(&x) && (top..=bottom).contains(&y);
+    let places: Vec<(f64, f64)> =
+        (0..400).map(|i| at(cpu * 10_f64.powf(f64::from(i) / 100.0))).take_while(|p| inside(*p)).collect();
+    if let (Some(from), Some(to)) = (places.first(), places.last()) {
+        let _ = writeln!(
+            svg,
+            "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"#a9a294\" stroke-dasharray=\"1 4\"/>",
+            from.0, from.1, to.0, to.1
+        );
+        text(svg, (to.0 - 4.0, to.1 - 6.0), "end", "slope −½");
+    }
+}
+
+fn dashes(curve: &Curve) -> &'static str {
+    match curve.peer {
+        None => "",
+        Some(Origin::SameRun) => DASHES,
+        Some(Origin::Stored(_)) => SHORT_DASHES,
+    }
+}
+
 fn draw_curve(svg: &mut String, curve: &Curve, colour: &str, (x, y): (&LogAxis, &LogAxis)) {
     let places: Vec<(f64, f64)> = curve.points.iter().map(|p| (x.at(p.cpu), y.at(p.error))).collect();
+    polyline(svg, &places, colour, dashes(curve));
+}
+
+/// Points and the lines between them.
+pub(super) fn polyline(svg: &mut String, places: &[(f64, f64)], colour: &str, dashes: &str) {
     let path: Vec<String> = places.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
     let _ = writeln!(
         svg,
-        "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.5\" stroke-linejoin=\"round\"/>",
+        "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.5\" stroke-linejoin=\"round\"{dashes}/>",
         path.join(" ")
     );
     for (x, y) in places {
@@ -93,8 +136,9 @@ fn legend(svg: &mut String, curves: &[Curve]) {
         let colour = COLOURS[index % COLOURS.len()];
         let _ = writeln!(
             svg,
-            "<line x1=\"{left}\" y1=\"{y}\" x2=\"{}\" y2=\"{y}\" stroke=\"{colour}\" stroke-width=\"3\"/>",
-            left + 24.0
+            "<line x1=\"{left}\" y1=\"{y}\" x2=\"{}\" y2=\"{y}\" stroke=\"{colour}\" stroke-width=\"3\"{}/>",
+            left + 24.0,
+            dashes(curve)
         );
         let slope = curve.slope().map_or_else(String::new, |slope| format!(", slope {slope:.2}"));
         let words = escaped(&format!("{}{slope}", curve.method.name));

@@ -1,6 +1,6 @@
 //! Charts as CSV and JSON.
 
-use super::{Chart, Curve, End, Honesty, Reference, Rival, Timing};
+use super::{Chart, Curve, End, Honesty, Origin, Reference, Rival, Scaling, Timing};
 use crate::image_io::LinearImage;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -17,8 +17,8 @@ pub struct SceneResults {
     pub charts: Vec<Chart>,
     /// Structures and their times.
     pub timings: Vec<Timing>,
-    /// Renders that stopped by their own estimate, if that was asked for.
-    pub honesty: Vec<Honesty>,
+    /// Renders that stopped by their own estimate, if that was asked for, and the reference's own error in their measure.
+    pub honesty: Option<(Vec<Honesty>, f64)>,
 }
 
 /// One line per measurement.
@@ -40,17 +40,71 @@ pub fn csv(results: &[&SceneResults]) -> String {
     text
 }
 
+/// Tables for a text: CPU seconds to each error, slopes, and the words that renders kept.
+#[must_use]
+pub fn markdown(results: &[&SceneResults]) -> String {
+    let mut text = String::new();
+    let heads: String = LEVELS.iter().map(|level| format!(" {} % |", 100.0 * level)).collect();
+    for chart in results.iter().flat_map(|r| &r.charts) {
+        let reference = 100.0 * chart.reference.error;
+        let _ = writeln!(
+            text,
+            "### {}: {}\n\nReference: {}, its own error {reference:.2} %.\n\n| CPU seconds to |{heads} slope | last error |\n|---|{}---|---|",
+            chart.scene,
+            chart.task.title(),
+            chart.reference.estimator,
+            "---|".repeat(LEVELS.len())
+        );
+        for curve in &chart.curves {
+            let cells: String = LEVELS
+                .iter()
+                .map(|&level| {
+                    curve.time_to_reach(level).map_or_else(|| " – |".to_owned(), |t| format!(" {t:.2} |"))
+                })
+                .collect();
+            let slope = curve.slope().map_or_else(|| "–".to_owned(), |slope| format!("{slope:.2}"));
+            let last = curve.points.last();
+            let last = last
+                .map_or_else(|| "–".to_owned(), |p| format!("{:.1} % at {:.1} s", 100.0 * p.error, p.cpu));
+            let _ = writeln!(text, "| {} |{cells} {slope} | {last} |", curve.method.name);
+        }
+        text.push('\n');
+    }
+    for (scene, (rows, _)) in results.iter().filter_map(|r| Some((&r.scene, r.honesty.as_ref()?))) {
+        let _ = writeln!(
+            text,
+            "### {scene}: renders that stop by their own estimate\n\n| asked | stopped | within | worst | time over need |\n|---|---|---|---|---|"
+        );
+        for row in rows {
+            let (target, worst) = (100.0 * row.target, 100.0 * row.worst);
+            let _ = writeln!(
+                text,
+                "| {target} % | {} | {} | {worst:.1} % | {:.2} |",
+                row.stopped, row.within, row.waste
+            );
+        }
+        text.push('\n');
+    }
+    text
+}
+
 /// Everything but the pictures.
 #[must_use]
-pub fn json(results: &[&SceneResults]) -> Value {
+pub fn json(results: &[&SceneResults], scaling: &[Scaling]) -> Value {
     let of_scene = |r: &SceneResults| {
         let charts: Vec<Value> = r.charts.iter().map(chart_json).collect();
-        let honesty: Vec<Value> = r.honesty.iter().map(honesty_json).collect();
+        let honesty: Vec<Value> = r.honesty.iter().flat_map(|(rows, _)| rows).map(honesty_json).collect();
         let structures: Vec<Value> =
             r.timings.iter().map(|t| json!({ "structure": t.structure, "cpu_seconds": t.cpu })).collect();
         json!({ "scene": r.scene, "charts": charts, "structures": structures, "honesty": honesty })
     };
-    json!({ "scenes": results.iter().copied().map(of_scene).collect::<Vec<_>>() })
+    let of_scaling = |s: &Scaling| {
+        let series: Vec<Value> =
+            s.series.iter().map(|part| json!({ "part": part.name, "points": part.points })).collect();
+        json!({ "over": s.over, "scene": s.scene, "unit": s.unit, "theory": s.theory, "series": series })
+    };
+    json!({ "scaling": scaling.iter().map(of_scaling).collect::<Vec<_>>(),
+            "scenes": results.iter().copied().map(of_scene).collect::<Vec<_>>() })
 }
 
 fn chart_json(chart: &Chart) -> Value {
@@ -75,7 +129,7 @@ pub fn reference_json(reference: &Reference) -> Value {
     })
 }
 
-/// A reference that was written down, with its picture.
+/// A reference that was written down, with its picture; of all pixels.
 #[must_use]
 pub fn reference_from(json: &Value, image: LinearImage) -> Option<Reference> {
     let number = |value: &Value, key: &str| value[key].as_f64();
@@ -96,6 +150,7 @@ pub fn reference_from(json: &Value, image: LinearImage) -> Option<Reference> {
         rounds: json["rounds"].as_u64()? as u32,
         cpu: number(json, "cpu_seconds")?,
         rival: rival(&json["rival"]),
+        mask: None,
     })
 }
 
@@ -112,6 +167,7 @@ fn curve_json(curve: &Curve) -> Value {
     json!({
         "method": curve.method.name, "settings": curve.method.settings, "points": points,
         "slope": curve.slope(), "time_to_reach": times, "end": end(&curve.end), "warnings": curve.warnings,
+        "peer": curve.peer.as_ref().map(|origin| match origin { Origin::SameRun => "same run", Origin::Stored(words) => words }),
     })
 }
 
@@ -121,6 +177,7 @@ pub fn end(end: &End) -> String {
     match end {
         End::Time => "its time was up".to_owned(),
         End::Reference => "the reference cannot tell more".to_owned(),
+        End::Measured => "there are no more pictures".to_owned(),
         End::Failed(error) => format!("it failed: {error}"),
     }
 }

@@ -1,6 +1,7 @@
 //! Scenes in which methods of this kind break: every picture is finite, ends, and is not silently wrong.
 
 use crate::support::{camera_above, compile, floor, mean, mean_irradiance, over_seeds, render, scene};
+use nephroid::lab::stability::{Effort, Outcome, Truth, cases, csv, json as table, page, run_case};
 use nephroid::light_path::PathClass;
 use nephroid::pass1_light::{Block, trace_block, windows};
 use nephroid::plan::Plan;
@@ -164,4 +165,93 @@ fn f63_leaving_out_caustics_is_said() {
     assert!(!warned(&scene));
     scene.render.paths = Paths::Whitted;
     assert!(warned(&scene));
+}
+
+/// Runs the cases of the stability table from one number to another: each is finite, ends, and is right, or is said or known
+/// to be wrong.
+fn no_case_is_at_fault(numbers: std::ops::RangeInclusive<u32>) {
+    let rows: Vec<_> = cases()
+        .iter()
+        .filter(|case| numbers.contains(&case.number()))
+        .map(|case| run_case(case, Effort { seeds: 3, rounds: 4 }))
+        .collect();
+    assert!(!rows.is_empty() && rows.iter().all(|row| !row.cells.is_empty()));
+    let faults: Vec<String> = rows
+        .iter()
+        .flat_map(|row| row.cells.iter().map(move |cell| (row.case.rows, row.case.title, cell)))
+        .filter(|(.., cell)| cell.outcome.is_fault())
+        .map(|(number, title, cell)| {
+            format!(
+                "{number} {title}, {}: {:?}, {:?} ± {:?}",
+                cell.method, cell.outcome, cell.error, cell.noise
+            )
+        })
+        .collect();
+    assert!(faults.is_empty(), "{faults:#?}");
+    // What is known of a case, the default method meets.
+    for row in &rows {
+        let first = &row.cells[0].outcome;
+        let known = matches!(row.case.truth, Truth::Mean { .. } | Truth::Probe(_));
+        assert!(!known || *first == Outcome::Right, "{} {}: {first:?}", row.case.rows, row.case.title);
+    }
+    let cells: usize = rows.iter().map(|row| row.cells.len()).sum();
+    assert_eq!(csv(&rows).lines().count(), 1 + cells);
+    assert_eq!(table(&rows)["cases"].as_array().unwrap().len(), rows.len());
+    let html = page(&rows).unwrap();
+    assert!(html.matches("<strong>").count() == cells && !html.contains("src=\"http"));
+}
+
+#[test]
+fn f1_to_f14_in_the_table_are_not_at_fault() {
+    no_case_is_at_fault(1..=14);
+}
+
+#[test]
+fn f15_to_f26_in_the_table_are_not_at_fault() {
+    no_case_is_at_fault(15..=26);
+}
+
+#[test]
+fn f27_to_f43_in_the_table_are_not_at_fault() {
+    no_case_is_at_fault(27..=43);
+}
+
+#[test]
+fn f44_to_f60_in_the_table_are_not_at_fault() {
+    no_case_is_at_fault(44..=60);
+}
+
+#[test]
+fn f61_to_f76_in_the_table_are_not_at_fault() {
+    no_case_is_at_fault(61..=76);
+}
+
+/// F1 to F76, all that concerns the renderer, has its case.
+#[test]
+fn every_failure_has_a_case_in_the_table() {
+    let all: Vec<String> = cases().iter().flat_map(|case| case.rows.split(", ")).map(str::to_owned).collect();
+    for number in 1..=76 {
+        assert!(all.contains(&format!("F{number}")), "F{number}");
+    }
+}
+
+/// The table finds what is wrong: a truth that is not, a warning that is not given, a scene that is not refused.
+#[test]
+fn the_table_finds_faults() {
+    let effort = Effort { seeds: 2, rounds: 2 };
+    let lit = cases().into_iter().find(|case| case.rows == "F53").unwrap();
+    let outcome = |case| run_case(&case, effort).cells[0].outcome.clone();
+    assert_eq!(outcome(lit.clone()), Outcome::Right);
+    let Truth::Mean { class, value } = lit.truth.clone() else { panic!("{:?}", lit.truth) };
+    let mut wrong = lit.clone();
+    wrong.truth = Truth::Mean { class, value: 1.1 * value };
+    assert_eq!(outcome(wrong.clone()), Outcome::Wrong);
+    wrong.limits.push(("default", "a reason"));
+    assert_eq!(outcome(wrong), Outcome::Known("a reason"));
+    let mut silent = lit.clone();
+    silent.warns = &["no_light"];
+    assert!(matches!(outcome(silent), Outcome::Unwarned(_)));
+    let mut accepted = lit;
+    accepted.truth = Truth::Refused(nephroid::scene::IssueCode::OutOfRange, "/camera");
+    assert!(matches!(outcome(accepted), Outcome::NotRefused(_)));
 }
