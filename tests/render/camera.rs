@@ -1,6 +1,6 @@
 //! Thin lens and orthographic camera.
 
-use crate::support::{camera_above, compile, floor, mean, render, scene};
+use crate::support::{T_LIMIT, camera_above, compile, floor, mean, over_seeds, render, scene};
 use nephroid::light_path::PathClass;
 use nephroid::plan::Plan;
 use nephroid::scene::{NoAssets, Scene};
@@ -66,10 +66,13 @@ fn f70_an_aperture_of_zero_is_the_pinhole() {
         |value: &Value| Plan::new(&compile(value)).decisions.iter().any(|d| d.topic == "lens" && d.runs);
     let (_, open) = with(0.05);
     assert!(!runs(&zero) && runs(&open));
-    // What a lens sees of a caustic is as bright on average.
-    let caustic = |value: &Value| mean(&render(value, 1, 8, 13).layer(PathClass::Caustic));
+    // What a lens sees of a caustic is as bright on average. The focus is smaller than a pixel: a single render is 10 % off.
+    let caustic =
+        |value: &Value| over_seeds(|seed| mean(&render(value, seed, 8, 13).layer(PathClass::Caustic)));
     let (sharp, soft) = (caustic(&zero), caustic(&open));
-    assert!(sharp > 0.0 && (soft / sharp - 1.0).abs() < 0.1, "{sharp} {soft}");
+    let noise = T_LIMIT * sharp.standard_error.hypot(soft.standard_error);
+    assert!(noise < 0.4 * sharp.mean, "too noisy to tell: {sharp:?} {soft:?}");
+    assert!((soft.mean - sharp.mean).abs() < noise, "{sharp:?} {soft:?}");
 }
 
 /// F70, F71: no focus in the lens, no negative aperture, no view without direction.
