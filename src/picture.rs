@@ -154,8 +154,8 @@ pub struct PixelError {
 }
 
 impl PixelError {
-    /// Root of the mean over pixels, which 95 in 100 true errors are below: where few pixels hold most of the error, the
-    /// estimate of it is itself uncertain. A pixel's error is a squared normal number, so that its variance is 2/3 of the
+    /// Root of the upper end of the mean's one-sided 95 % range: where few pixels hold most of the error, the estimate of
+    /// it is itself uncertain. Pixels count as independent, which smoothed ones are not quite. A pixel's error is a squared normal number, so that its variance is 2/3 of the
     /// mean of its square.
     #[must_use]
     pub fn bound(errors: &[Self]) -> f32 {

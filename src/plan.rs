@@ -198,6 +198,13 @@ impl Plan {
             self.decide("pass 1", false, "no photons", "no light gives light");
             return;
         }
+        if scene.render.aiming == Aiming::Everywhere {
+            self.warn(
+                "aimed_everywhere",
+                "photons go in all directions: where few meet mirrors or glass, caustics are noisy or missing, and the \
+                 estimated error cannot know it",
+            );
+        }
         let fewer = fewer_log2(windows.len());
         let pilots: Vec<Pilot> =
             windows.into_par_iter().enumerate().map(|(i, w)| pilot(scene, w, (i as u64, fewer))).collect();

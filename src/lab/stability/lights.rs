@@ -169,5 +169,4 @@ fn one_row(row: &'static str, title: &'static str, [width, height]: [u32; 2]) ->
     Case::new(row, title, "sizes divided by, windows of samples that hold none", value)
         .mean_of(PathClass::Caustic, LIT, 0.03)
         .limit("progressive", "its first radius is four pixels, wider than the caustic")
-        .limit("aimed everywhere", "of few photons that go everywhere none may land in so small a picture")
 }

@@ -120,7 +120,6 @@ fn light_in_glass() -> Case {
         build(json!([floor(2.0), ball("glass", [0.0, 1.0, 0.0], 0.25)])),
     )
     .same_as(build(json!([floor(2.0)])), 0.02)
-    .limit("aimed everywhere", "few of its photons land in so small a picture")
 }
 
 fn open_glass() -> Case {
