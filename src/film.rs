@@ -39,13 +39,18 @@ impl ClassSums {
 }
 
 /// What one half of a pixel has gathered. The emitted and direct classes are sums over eye samples; what
-/// photons bring is a sum over rounds, weighted by the rounds' photons.
+/// photons bring is a sum over rounds, weighted by the rounds' photons; the indirect class is a sum over the eye
+/// samples that go on as paths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HalfSums {
     /// Radiance per class; of the caustic class, what was looked up point by point.
     pub classes: ClassSums,
     /// Irradiance that photons bring to the pixel's footprint.
     pub irradiance: Vec3,
+    /// Irradiance that other D bring to the pixel's footprint; the indirect class holds only what falls elsewhere.
+    pub indirect: Vec3,
+    /// Number of paths that left it.
+    pub departures: u32,
 }
 
 /// Means of a pixel.
@@ -53,8 +58,10 @@ pub struct HalfSums {
 pub struct PixelMeans {
     /// Radiance per class in each half.
     pub halves: [ClassSums; 2],
-    /// Irradiance of the pixel's footprint, in each half.
+    /// Irradiance of the pixel's footprint by photons, in each half.
     pub irradiance: [Vec3; 2],
+    /// Irradiance of the pixel's footprint by other D, in each half; `None` if no path has asked for it.
+    pub indirect: Option<[Vec3; 2]>,
     /// Radiance of the pixel per irradiance of its footprint.
     pub gain: Vec3,
 }
@@ -82,6 +89,8 @@ pub struct PixelSums {
     pub gain: Vec3,
     /// Eye samples in each half.
     pub samples: u32,
+    /// Those among them that went on from the first D as paths.
+    pub paths: u32,
 }
 
 impl PixelSums {
@@ -106,8 +115,11 @@ impl PixelSums {
     fn add(&mut self, other: &Self) {
         self.gain += other.gain;
         self.samples += other.samples;
+        self.paths += other.paths;
         for (mine, theirs) in self.halves.iter_mut().zip(&other.halves) {
             mine.irradiance += theirs.irradiance;
+            mine.indirect += theirs.indirect;
+            mine.departures += theirs.departures;
             for (a, b) in mine.classes.0.iter_mut().zip(&theirs.classes.0) {
                 *a += *b;
             }
@@ -116,6 +128,7 @@ impl PixelSums {
 
     fn means(&self, photon_weight: f32, caustics: Caustics) -> PixelMeans {
         let per_sample = 1.0 / self.samples.max(1) as f32;
+        let per_path = 1.0 / self.paths.max(1) as f32;
         let per_photon = if photon_weight > 0.0 { 1.0 / photon_weight } else { 0.0 };
         let gain = self.gain * (0.5 * per_sample);
         let irradiance = self.halves.map(|half| half.irradiance * per_photon);
@@ -123,7 +136,8 @@ impl PixelSums {
             let mut means = half.classes;
             for class in PathClass::ALL {
                 means.0[class as usize] *= match class {
-                    PathClass::Emitted | PathClass::Direct | PathClass::Indirect => per_sample,
+                    PathClass::Emitted | PathClass::Direct => per_sample,
+                    PathClass::Indirect => per_path,
                     PathClass::Caustic => match caustics {
                         Caustics::Photons | Caustics::Forward => per_photon,
                         Caustics::Backward => per_sample,
@@ -133,7 +147,23 @@ impl PixelSums {
             means.add(PathClass::Caustic, gain * half.irradiance * per_photon);
             means
         });
-        PixelMeans { halves, irradiance, gain }
+        let indirect = self.indirect_of(self.halves.map(|half| half.indirect));
+        let mut means = PixelMeans { halves, irradiance, indirect, gain };
+        for (half, indirect) in means.halves.iter_mut().zip(means.indirect.iter().flatten()) {
+            half.add(PathClass::Indirect, gain * *indirect);
+        }
+        means
+    }
+
+    /// Means of what the paths of each half have found; `None` if there were none. A half without paths is told what the
+    /// other has found.
+    fn indirect_of(&self, sums: [Vec3; 2]) -> Option<[Vec3; 2]> {
+        let mean = |half: usize| {
+            let departures = self.halves[half].departures;
+            (departures > 0).then(|| sums[half] / departures as f32)
+        };
+        let [a, b] = [mean(0), mean(1)];
+        Some([a.or(b)?, b.or(a)?])
     }
 
     /// The class that holds a number that is not finite, if any.
@@ -144,6 +174,10 @@ impl PixelSums {
             .or_else(|| {
                 let counted = self.gain + self.halves[0].irradiance + self.halves[1].irradiance;
                 (!counted.is_finite()).then_some(PathClass::Caustic)
+            })
+            .or_else(|| {
+                let counted = self.halves[0].indirect + self.halves[1].indirect;
+                (!counted.is_finite()).then_some(PathClass::Indirect)
             })
     }
 }
@@ -312,5 +346,8 @@ mod tests {
         let mut pixel = PixelSums::default();
         pixel.halves[0].irradiance.z = f32::NAN;
         assert_eq!(pixel.not_finite(), Some(PathClass::Caustic));
+        let mut pixel = PixelSums::default();
+        pixel.halves[0].indirect.x = f32::INFINITY;
+        assert_eq!(pixel.not_finite(), Some(PathClass::Indirect));
     }
 }

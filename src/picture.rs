@@ -1,4 +1,4 @@
-//! The picture: the film with its caustics smoothed, in layers, and how far it may be from the truth.
+//! The picture: the film with its caustics and its indirect light smoothed, in layers, and how far it may be from the truth.
 
 use crate::film::{Film, PixelMeans};
 use crate::image_io::LinearImage;
@@ -6,53 +6,55 @@ use crate::light_path::PathClass;
 use crate::pass2_eye::Footprints;
 use crate::plan::Layer;
 use crate::scene::Caustics;
-use crate::smooth::{Smoothing, smooth, smooth_part};
+use crate::smooth::{Gathered, Smoothed, Smoothing, smooth, smooth_part};
 use glam::Vec3;
 use std::borrow::Cow;
 
-/// A film with the smoothing of its caustics.
+/// A film with its smoothing.
 pub struct Picture<'a> {
     film: &'a Film,
     footprints: &'a Footprints,
-    smoothing: Option<Cow<'a, Smoothing>>,
+    smoothing: Cow<'a, Smoothing>,
 }
 
 impl<'a> Picture<'a> {
-    /// Smooths the film's caustics.
+    /// Smooths the film.
     #[must_use]
     pub fn new(film: &'a Film, footprints: &'a Footprints) -> Self {
-        Self { film, footprints, smoothing: smooth(film, footprints).map(Cow::Owned) }
+        Self { film, footprints, smoothing: Cow::Owned(smooth(film, footprints)) }
     }
 
     /// A picture whose smoothing is known.
     #[must_use]
-    pub fn with_smoothing(
-        film: &'a Film,
-        footprints: &'a Footprints,
-        smoothing: Option<&'a Smoothing>,
-    ) -> Self {
-        Self { film, footprints, smoothing: smoothing.map(Cow::Borrowed) }
+    pub fn with_smoothing(film: &'a Film, footprints: &'a Footprints, smoothing: &'a Smoothing) -> Self {
+        Self { film, footprints, smoothing: Cow::Borrowed(smoothing) }
     }
 
     /// The smoothing, to keep.
     #[must_use]
-    pub fn into_smoothing(self) -> Option<Smoothing> {
-        self.smoothing.map(Cow::into_owned)
+    pub fn into_smoothing(self) -> Smoothing {
+        self.smoothing.into_owned()
     }
 
     /// All classes together.
     #[must_use]
     pub fn image(&self) -> LinearImage {
-        self.corrected(self.film.raw_image())
+        let smoothed = [&self.smoothing.photons, &self.smoothing.indirect].into_iter().flatten();
+        smoothed.fold(self.film.raw_image(), |image, smoothed| add(image, &smoothed.correction))
     }
 
     /// One class; the layers add up to the image.
     #[must_use]
     pub fn layer(&self, class: PathClass) -> LinearImage {
         let layer = self.film.raw_layer(class);
-        match class {
-            PathClass::Caustic => self.corrected(layer),
-            PathClass::Emitted | PathClass::Direct | PathClass::Indirect => layer,
+        let smoothed = match class {
+            PathClass::Emitted | PathClass::Direct => &None,
+            PathClass::Caustic => &self.smoothing.photons,
+            PathClass::Indirect => &self.smoothing.indirect,
+        };
+        match smoothed {
+            Some(smoothed) => add(layer, &smoothed.correction),
+            None => layer,
         }
     }
 
@@ -65,24 +67,22 @@ impl<'a> Picture<'a> {
         }
     }
 
-    /// A named layer, its part of the caustics smoothed as the whole is.
+    /// A named layer, its part of what is smoothed as the whole is.
     fn named_layer(&self, index: usize) -> LinearImage {
-        let layer = self.film.named_layer(index);
-        let Some(smoothing) = &self.smoothing else { return layer };
-        let irradiance = self.film.layer_irradiance(index);
-        add(layer, &smooth_part(self.film, self.footprints, smoothing, &irradiance))
-    }
-
-    fn corrected(&self, image: LinearImage) -> LinearImage {
-        match &self.smoothing {
-            Some(smoothing) => add(image, &smoothing.correction),
-            None => image,
-        }
+        let Smoothing { photons, indirect } = &*self.smoothing;
+        let parts = [
+            (photons, Gathered::Photons, self.film.layer_irradiance(index)),
+            (indirect, Gathered::Indirect, self.film.layer_indirect(index)),
+        ];
+        parts.into_iter().fold(self.film.named_layer(index), |layer, (smoothed, gathered, part)| {
+            let Some(smoothed) = smoothed else { return layer };
+            add(layer, &smooth_part((self.film, self.footprints), (gathered, smoothed), &part))
+        })
     }
 
     /// Estimated relative error of the image: the root of the mean over pixels and channels of
     /// (σ² + b²) / (L² + (0.1 L_mean)²), at the upper end of that mean's own 95 % range. For what is sampled, σ² = (A - B)²/4 is
-    /// the unbiased estimate of the mean's variance from its two independent halves; for smoothed caustics the noise and
+    /// the unbiased estimate of the mean's variance from its two independent halves; for what is smoothed the noise and
     /// the blur b of the chosen width. `None` before the first round.
     #[must_use]
     pub fn error_estimate(&self) -> Option<f32> {
@@ -120,24 +120,33 @@ impl<'a> Picture<'a> {
             return PixelError::default();
         }
         let half = |class| 0.5 * (means.halves[0].get(class) - means.halves[1].get(class));
-        let mut sampled = half(PathClass::Emitted) + half(PathClass::Direct) + half(PathClass::Indirect);
+        let mut sampled = half(PathClass::Emitted) + half(PathClass::Direct);
+        let mut paths = half(PathClass::Indirect);
+        let Smoothing { photons: caustics, indirect } = &*self.smoothing;
+        let left = |smoothed: &Option<Smoothed>| smoothed.as_ref().and_then(|s| s.squared_error[index]);
+        let bounced = left(indirect);
+        if let (Some(_), Some([a, b])) = (bounced, means.indirect) {
+            paths -= means.gain * 0.5 * (a - b);
+        }
         let mut photons = half(PathClass::Caustic);
         if self.film.caustics() == Caustics::Backward {
             sampled += std::mem::take(&mut photons);
         }
-        let smoothed = self.smoothing.as_ref().and_then(|s| s.squared_error[index]);
+        let smoothed = left(caustics);
         if smoothed.is_some() {
             photons -= means.gain * 0.5 * (means.irradiance[0] - means.irradiance[1]);
         }
-        let darker = value - (sampled + photons).abs();
+        let darker = value - (sampled + paths + photons).abs();
         let photons = photons * photons + Vec3::splat(smoothed.unwrap_or(0.0));
+        let paths = paths * paths + Vec3::splat(bounced.unwrap_or(0.0));
         let sampled = sampled * sampled;
         let own = value * value + floor * floor;
         let radiance = darker.max(value.min(around)).max(Vec3::ZERO);
         PixelError {
             sampled: mean_channel(sampled / own),
+            paths: mean_channel(paths / own),
             photons: mean_channel(photons / own),
-            relative: mean_channel((sampled + photons) / (radiance * radiance + floor * floor)),
+            relative: mean_channel((sampled + paths + photons) / (radiance * radiance + floor * floor)),
         }
     }
 }
@@ -147,9 +156,11 @@ impl<'a> Picture<'a> {
 pub struct PixelError {
     /// Of what eye samples bring, emitted and direct light, relative to the pixel's own radiance.
     pub sampled: f32,
+    /// Of what paths bring, indirect light, relative to the same.
+    pub paths: f32,
     /// Of what photons bring, relative to the same.
     pub photons: f32,
-    /// Of both, relative to a radiance that does not hold the error.
+    /// Of all, relative to a radiance that does not hold the error.
     pub relative: f32,
 }
 

@@ -11,7 +11,7 @@ use crate::plan::Plan;
 use crate::radius::RadiusRule;
 use crate::sampling::{SamplePoint, hash};
 use crate::scene::{Caustics, Scene};
-use crate::smooth::Smoothing;
+use crate::smooth::{Smoothing, smoothable};
 use cpu_time::ProcessTime;
 use std::sync::Arc;
 use std::time::Instant;
@@ -139,10 +139,12 @@ pub struct Render {
     eye: EyeCounts,
     /// Traced before the first round, if there are photons to count on them.
     footprints: Footprints,
+    /// Where indirect light is smoothed.
+    smoothable: Vec<bool>,
     /// The picture at the last milestone.
     preview: LinearImage,
     /// The smoothing then, and its number of rounds.
-    smoothing: Option<(u32, Option<Smoothing>)>,
+    smoothing: Option<(u32, Smoothing)>,
     /// Blocks of photons used up.
     blocks: u32,
     /// Decided at the last round that [`is_milestone`].
@@ -178,6 +180,7 @@ impl Render {
             error: None,
             blocks: 0,
             footprints: Footprints::default(),
+            smoothable: Vec::new(),
             smoothing: None,
             preview,
             effort: Effort::default(),
@@ -231,14 +234,22 @@ impl Render {
         Ok(RoundReport { rounds: self.rounds(), error: self.error_estimate(), seconds: self.seconds() })
     }
 
-    /// Traces the pixels' footprints once, if photons are counted on them. A progressive radius is the classic
-    /// method instead: photons are looked up point by point, and nothing is smoothed.
+    /// Traces the pixels' footprints once, if photons are counted on them or paths that leave them are smoothed. A
+    /// progressive radius is the classic method instead: photons are looked up point by point, and nothing is smoothed.
     fn trace_footprints(&mut self) {
-        let gathered = !self.plan.photons.is_empty() && self.plan.caustics == Some(Caustics::Photons);
-        let seen = self.plan.classes.contains(PathClass::Caustic);
-        let counted = gathered && seen && self.plan.radius == RadiusRule::Pixel;
-        if counted && self.footprints.size().0 == 0 {
+        let Plan { caustics, classes, .. } = &self.plan;
+        let gathered = !self.plan.photons.is_empty() && *caustics == Some(Caustics::Photons);
+        let counted = gathered && classes.contains(PathClass::Caustic);
+        let smoothed = classes.contains(PathClass::Indirect) && *caustics != Some(Caustics::Backward);
+        let wanted = (counted || smoothed) && self.plan.radius == RadiusRule::Pixel;
+        if wanted && self.footprints.size().0 == 0 {
             self.footprints = Footprints::trace(&self.scene, &self.plan.eye_media);
+            if smoothed {
+                self.smoothable = smoothable(&self.footprints);
+            }
+        }
+        if self.rounds() == 0 {
+            self.effort = Effort::first(&self.smoothable, (self.film.size().0, self.scene.render.seed));
         }
     }
 
@@ -329,7 +340,7 @@ impl Render {
     pub fn picture(&self) -> Picture<'_> {
         match &self.smoothing {
             Some((rounds, smoothing)) if *rounds == self.rounds() => {
-                Picture::with_smoothing(&self.film, &self.footprints, smoothing.as_ref())
+                Picture::with_smoothing(&self.film, &self.footprints, smoothing)
             }
             _ => Picture::new(&self.film, &self.footprints),
         }

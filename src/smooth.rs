@@ -1,13 +1,15 @@
-//! How wide the caustics are smoothed at the end: per pixel, as the two halves of the film advise.
+//! How wide caustics and indirect light are smoothed at the end: per pixel, as the two halves of the film advise.
 //!
 //! Photons are gathered over about a pixel, so that what is sharp stays sharp; where a caustic is smooth,
-//! that leaves noise which its neighbours on the same surface could take away. Each segment of the picture
+//! that leaves noise which its neighbours on the same surface could take away. So does each of the few paths that
+//! find the light from other D. Each segment of the picture
 //! that shows one smooth piece of surface has its irradiance filtered at a ladder of widths. Halves A and B
 //! are independent, so that (A_l - A_k)(B_l - B_k) estimates what width l blurs away beyond width k and
 //! (A_l - B_l)²/4 the noise it leaves, both without bias; the width with the least sum is taken, from large
 //! windows to small, a smaller window overruling only where it promises clearly less error.
 //!
-//! The main way of the eye through mirrors and glass is smoothed only; its fainter branches stay as they are.
+//! The main way of the eye through mirrors and glass is smoothed only; its fainter branches stay as they are. Within a
+//! pixel, irradiance and the surface's colour count as independent of each other.
 
 mod ladder;
 mod segment;
@@ -19,16 +21,34 @@ use ladder::Ladder;
 use rayon::prelude::*;
 use segment::Segment;
 
-/// What smoothing adds to the film.
-#[derive(Clone, Debug, PartialEq)]
+/// What smoothing does to a film.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Smoothing {
-    /// Radiance to add to each pixel's caustic layer.
+    /// To the caustics; `None` if the film holds no photons.
+    pub photons: Option<Smoothed>,
+    /// To the indirect light; `None` if no footprint has any.
+    pub indirect: Option<Smoothed>,
+}
+
+/// What smoothing does to one kind of irradiance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Smoothed {
+    /// Radiance to add to each pixel's layer.
     pub correction: Vec<Vec3>,
-    /// Estimated squared error of the caustic radiance that is left, mean over channels; `None` where the
+    /// Estimated squared error of the radiance that is left, mean over channels; `None` where the
     /// pixel stays as it was gathered.
     pub squared_error: Vec<Option<f32>>,
     /// The width chosen for each pixel; 0 where it stays as it was gathered.
     level: Vec<u8>,
+}
+
+/// A kind of irradiance of the pixels' footprints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gathered {
+    /// By photons.
+    Photons,
+    /// By paths that go on from there.
+    Indirect,
 }
 
 /// Segments with fewer pixels tell too little about noise and blur.
@@ -43,12 +63,46 @@ struct Sample {
     gain: Vec3,
     /// Radiance of everything else.
     rest: Vec3,
+    /// Whether anything is known of the irradiance; where not, neighbours tell it.
+    known: bool,
 }
 
-/// Decides the widths and filters; `None` if the film holds no photons.
+/// Decides the widths and filters.
 #[must_use]
-pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
-    let samples: Vec<Sample> = film.means().map(|means| Sample::of(&means)).collect();
+pub fn smooth(film: &Film, footprints: &Footprints) -> Smoothing {
+    let (photons, indirect) = rayon::join(
+        || smooth_one(film, footprints, Gathered::Photons),
+        || smooth_one(film, footprints, Gathered::Indirect),
+    );
+    Smoothing { photons, indirect }
+}
+
+impl Smoothing {
+    /// Before the first smoothing: nothing is changed, and of indirect light's noise nothing is expected to be left where it
+    /// will be smoothed.
+    #[must_use]
+    pub fn expected(smoothable: &[bool]) -> Self {
+        let indirect = smoothable.iter().any(|&s| s).then(|| Smoothed {
+            correction: vec![Vec3::ZERO; smoothable.len()],
+            squared_error: smoothable.iter().map(|&s| s.then_some(0.0)).collect(),
+            level: vec![0; smoothable.len()],
+        });
+        Self { photons: None, indirect }
+    }
+}
+
+/// Which pixels show a piece of surface that is large enough to be smoothed.
+#[must_use]
+pub fn smoothable(footprints: &Footprints) -> Vec<bool> {
+    let mut smoothable = vec![false; footprints.size().0];
+    for segment in segment::segments(footprints).iter().filter(|s| s.pixels.len() >= LEAST_PIXELS) {
+        segment.pixels.iter().for_each(|&pixel| smoothable[pixel as usize] = true);
+    }
+    smoothable
+}
+
+fn smooth_one(film: &Film, footprints: &Footprints, gathered: Gathered) -> Option<Smoothed> {
+    let samples = samples(film, gathered);
     if samples.iter().all(|s| s.irradiance == [Vec3::ZERO; 2]) {
         return None;
     }
@@ -56,41 +110,42 @@ pub fn smooth(film: &Film, footprints: &Footprints) -> Option<Smoothing> {
     let mean = sum / samples.len() as f32;
     let filtered: Vec<(Segment, Ladder)> = lit_segments(footprints, &samples)
         .map(|segment| {
-            let ladder = Ladder::climb(&segment, &samples, 0.1 * mean);
+            let ladder = Ladder::climb(&segment, &samples, (gathered, 0.1 * mean));
             (segment, ladder)
         })
         .collect();
-    let mut correction = vec![Vec3::ZERO; samples.len()];
-    let mut squared_error = vec![None; samples.len()];
-    let mut level = vec![0; samples.len()];
+    let mut smoothed = Smoothed {
+        correction: vec![Vec3::ZERO; samples.len()],
+        squared_error: vec![None; samples.len()],
+        level: vec![0; samples.len()],
+    };
     for (segment, ladder) in &filtered {
         for &pixel in &segment.pixels {
             let sample = &samples[pixel as usize];
             let choice = ladder.choice(segment.local(pixel));
             let raw = 0.5 * (sample.irradiance[0] + sample.irradiance[1]);
-            correction[pixel as usize] = sample.gain * (choice.irradiance - raw);
-            squared_error[pixel as usize] =
+            smoothed.correction[pixel as usize] = sample.gain * (choice.irradiance - raw);
+            smoothed.squared_error[pixel as usize] =
                 Some(choice.squared_error * mean_channel(sample.gain * sample.gain));
-            level[pixel as usize] = choice.level;
+            smoothed.level[pixel as usize] = choice.level;
         }
     }
-    Some(Smoothing { correction, squared_error, level })
+    Some(smoothed)
 }
 
 /// What the same widths add to a part of the irradiance, per pixel: radiance. What they add to all parts is the whole's
 /// correction.
 #[must_use]
 pub fn smooth_part(
-    film: &Film,
-    footprints: &Footprints,
-    smoothing: &Smoothing,
+    (film, footprints): (&Film, &Footprints),
+    (gathered, smoothed): (Gathered, &Smoothed),
     irradiance: &[Vec3],
 ) -> Vec<Vec3> {
-    let samples: Vec<Sample> = film.means().map(|means| Sample::of(&means)).collect();
+    let samples = samples(film, gathered);
     let mut correction = vec![Vec3::ZERO; samples.len()];
     let segments: Vec<Segment> = lit_segments(footprints, &samples).collect();
     for segment in &segments {
-        ladder::filter_part(segment, irradiance, &smoothing.level, |pixel, smooth| {
+        ladder::filter_part(segment, (irradiance, &samples), &smoothed.level, |pixel, smooth| {
             correction[pixel] = samples[pixel].gain * (smooth - irradiance[pixel]);
         });
     }
@@ -108,11 +163,19 @@ fn lit_segments<'a>(
         .filter(|segment| segment.pixels.len() >= LEAST_PIXELS)
 }
 
+fn samples(film: &Film, gathered: Gathered) -> Vec<Sample> {
+    film.means().map(|means| Sample::of(&means, gathered)).collect()
+}
+
 impl Sample {
-    fn of(means: &PixelMeans) -> Self {
-        let PixelMeans { irradiance, gain, .. } = *means;
+    fn of(means: &PixelMeans, gathered: Gathered) -> Self {
+        let (irradiance, known) = match gathered {
+            Gathered::Photons => (means.irradiance, true),
+            Gathered::Indirect => (means.indirect.unwrap_or_default(), means.indirect.is_some()),
+        };
+        let gain = means.gain;
         let rest = means.total() - gain * 0.5 * (irradiance[0] + irradiance[1]);
-        Self { irradiance, gain, rest: rest.max(Vec3::ZERO) }
+        Self { irradiance, gain, rest: rest.max(Vec3::ZERO), known }
     }
 }
 

@@ -53,9 +53,11 @@ impl PixelSums {
         for half in &self.halves {
             half.classes.0.iter().for_each(|v| vector(*v));
             vector(half.irradiance);
+            vector(half.indirect);
         }
         vector(self.gain);
-        word(self.samples);
+        self.halves.iter().for_each(|half| word(half.departures));
+        [self.samples, self.paths].into_iter().for_each(word);
     }
 
     /// The inverse of [`PixelSums::visit`].
@@ -64,8 +66,10 @@ impl PixelSums {
         for half in &mut self.halves {
             half.classes.0.iter_mut().for_each(|v| *v = vector());
             half.irradiance = vector();
+            half.indirect = vector();
         }
         self.gain = vector();
-        self.samples = word();
+        self.halves.iter_mut().for_each(|half| half.departures = word());
+        (self.samples, self.paths) = (word(), word());
     }
 }

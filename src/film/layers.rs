@@ -9,31 +9,52 @@ use glam::{DVec3, Vec3};
 pub struct LayerSums {
     /// Radiance that eye samples bring.
     pub sampled: Vec3,
+    /// Radiance that those bring which go on as paths, from other D.
+    pub bounced: Vec3,
     /// Radiance by photons that were looked up point by point.
     pub looked_up: Vec3,
     /// Irradiance that photons bring to the pixel's footprint.
     pub irradiance: Vec3,
+    /// Irradiance that other D bring to it, in each half.
+    pub indirect: [Vec3; 2],
 }
 
 impl LayerSums {
     /// Bytes of one.
     pub const BYTES: u64 = size_of::<Self>() as u64;
 
-    pub(super) fn to_array(self) -> [f32; 9] {
-        let parts = [self.sampled, self.looked_up, self.irradiance].map(|part| part.to_array());
+    pub(super) fn to_array(self) -> [f32; 18] {
+        let [a, b] = self.indirect;
+        let parts = [self.sampled, self.bounced, self.looked_up, self.irradiance, a, b].map(|part| part.to_array());
         std::array::from_fn(|i| parts[i / 3][i % 3])
     }
 
-    pub(super) fn from_array(values: [f32; 9]) -> Self {
+    pub(super) fn from_array(values: [f32; 18]) -> Self {
         let part = |i: usize| Vec3::from_slice(&values[3 * i..]);
-        Self { sampled: part(0), looked_up: part(1), irradiance: part(2) }
+        Self {
+            sampled: part(0),
+            bounced: part(1),
+            looked_up: part(2),
+            irradiance: part(3),
+            indirect: [part(4), part(5)],
+        }
     }
 
     /// Adds those of a round, whose photons count `photon_weight` times those of the first.
     pub(super) fn add(&mut self, round: &Self, photon_weight: f32) {
         self.sampled += round.sampled;
+        self.bounced += round.bounced;
         self.looked_up += round.looked_up * photon_weight;
         self.irradiance += round.irradiance * photon_weight;
+        for (mine, theirs) in self.indirect.iter_mut().zip(round.indirect) {
+            *mine += theirs;
+        }
+    }
+
+    /// Irradiance that other D bring to the pixel's footprint, mean of the halves.
+    fn indirect_mean(&self, pixel: &PixelSums) -> Vec3 {
+        let [a, b] = pixel.indirect_of(self.indirect).unwrap_or_default();
+        0.5 * (a + b)
     }
 }
 
@@ -63,16 +84,25 @@ impl Film {
         let each = self.layers.len() / self.pixels.len().max(1);
         let per_photon = if self.photon_weight > 0.0 { 0.5 / self.photon_weight } else { 0.0 };
         let value = |(sums, pixel): (&[LayerSums], &PixelSums)| {
-            let LayerSums { sampled, looked_up, irradiance } = sums[index];
-            let per_sample = 0.5 / pixel.samples.max(1) as f32;
-            let photons = pixel.gain * per_sample * irradiance + looked_up;
-            (sampled * per_sample + photons * per_photon).to_array()
+            let LayerSums { sampled, bounced, looked_up, irradiance, .. } = sums[index];
+            let [per_sample, per_path] = [pixel.samples, pixel.paths].map(|n| 0.5 / n.max(1) as f32);
+            let gain = pixel.gain * per_sample;
+            let photons = gain * irradiance + looked_up;
+            let indirect = bounced * per_path + gain * sums[index].indirect_mean(pixel);
+            (sampled * per_sample + indirect + photons * per_photon).to_array()
         };
         let pixels = self.layers.chunks_exact(each).zip(&self.pixels).map(value).collect();
         LinearImage { width: self.width, height: self.height, pixels }
     }
 
-    /// The part of a named layer in the irradiance of the pixels' footprints, mean of the halves.
+    /// The part of a named layer in the irradiance of the pixels' footprints by other D.
+    #[must_use]
+    pub fn layer_indirect(&self, index: usize) -> Vec<Vec3> {
+        let each = self.layers.len() / self.pixels.len().max(1);
+        self.layers.chunks_exact(each).zip(&self.pixels).map(|(sums, pixel)| sums[index].indirect_mean(pixel)).collect()
+    }
+
+    /// The part of a named layer in the irradiance of the pixels' footprints by photons, mean of the halves.
     #[must_use]
     pub fn layer_irradiance(&self, index: usize) -> Vec<Vec3> {
         let each = self.layers.len() / self.pixels.len().max(1);

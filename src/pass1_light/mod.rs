@@ -93,6 +93,8 @@ pub enum Carries {
 pub struct RoundPhotons {
     /// One map per half.
     pub maps: [PhotonMap; 2],
+    /// The same light in few photons, where second D look it up over a wide kernel.
+    pub thinned: Option<[PhotonMap; 2]>,
     /// The same light for pixels that see it directly, per half.
     pub spreads: [Spread; 2],
     /// When the photons of each half have flown.
@@ -135,7 +137,7 @@ pub fn emit_photons(
     blocks: Blocks,
     control: &Control,
 ) -> Result<RoundPhotons, RenderError> {
-    Ok(emit_lists(scene, budgets, blocks, control)?.into_maps())
+    Ok(emit_lists(scene, budgets, blocks, control)?.into_maps(None))
 }
 
 /// The same, as lists in the order of the windows and their points.
@@ -159,13 +161,29 @@ pub fn emit_lists(
 }
 
 impl RoundLists {
-    /// Builds the trees.
+    /// Builds the trees; if second D are to look photons up, those of about so few photons too, which a key picks.
     #[must_use]
-    pub fn into_maps(self) -> RoundPhotons {
+    pub fn into_maps(self, thin_to: Option<(usize, u64)>) -> RoundPhotons {
+        let build = |[a, b]: [&[Photon]; 2]| {
+            <[PhotonMap; 2]>::from(rayon::join(|| PhotonMap::build(a), || PhotonMap::build(b)))
+        };
         let [a, b] = &self.halves;
-        let (a, b) = rayon::join(|| PhotonMap::build(a), || PhotonMap::build(b));
-        RoundPhotons { maps: [a, b], spreads: self.spreads, times: self.times, tallies: self.tallies }
+        let maps = build([a, b]);
+        let thinned = thin_to.map(|(count, key)| {
+            let [a, b] = [0, 1].map(|half| thin(&self.halves[half], count, hash(key, half as u64)));
+            build([&a, &b])
+        });
+        RoundPhotons { maps, thinned, spreads: self.spreads, times: self.times, tallies: self.tallies }
     }
+}
+
+/// Every n-th photon in the place of n, so that about `count` are left: in the order of their points, which keeps them
+/// evenly spread; the key picks the first.
+fn thin(photons: &[Photon], count: usize, key: u64) -> Vec<Photon> {
+    let stride = photons.len().div_ceil(count.max(1)).max(1);
+    let first = (key % stride as u64) as usize;
+    let weigh = |photon: &Photon| Photon { power: photon.power * stride as f32, ..*photon };
+    photons.iter().skip(first).step_by(stride).map(weigh).collect()
 }
 
 /// What one half of a round finds.

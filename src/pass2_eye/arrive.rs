@@ -15,6 +15,7 @@ use crate::radius::{PIXEL, Reach};
 use crate::sampling::hash;
 use crate::scene::LightPoint;
 use glam::Vec3;
+use std::f32::consts::PI;
 
 /// Sobol dimensions, of a stream of its own, that draw the direction in which a path goes on, its lobe, and whether.
 const DIRECTION_DIMENSION: u32 = 8;
@@ -61,7 +62,7 @@ impl EyeWalk<'_> {
         } else {
             self.see_photons(branch, arrival, &bsdf, sums);
         }
-        self.leave(branch, arrival, &bsdf, seen);
+        self.leave(branch, arrival, (&bsdf, seen), sums);
         true
     }
 
@@ -78,16 +79,17 @@ impl EyeWalk<'_> {
         if self.context.plan.language.is_none() {
             let mut direct = Vec3::ZERO;
             direct_light(&receiver, sample, &mut shadow_rays, |_, radiance| direct += radiance);
-            self.add(class, PICTURE, branch.throughput * direct, sums);
+            self.add(branch, class, (PICTURE, direct), sums);
         } else {
             direct_light(&receiver, sample, &mut shadow_rays, |source, radiance| {
                 let pictures = match source {
                     Source::Light(light) => self.pictures_of_light(branch, class, light),
                     Source::Environment => self.pictures_of_environment(branch, class),
                 };
-                self.add(class, pictures, branch.throughput * radiance, sums);
+                self.add(branch, class, (pictures, radiance), sums);
             });
         }
+        self.count_rays(branch, shadow_rays);
         self.counts.shadow_rays += shadow_rays;
     }
 
@@ -96,8 +98,8 @@ impl EyeWalk<'_> {
         let scene = self.context.scene;
         let surface = &arrival.hit.surface;
         if branch.scattered.is_none() {
-            let radiance = branch.throughput * arrival.material().glow(surface.uv);
-            self.add(PathClass::Emitted, self.pictures_of_glow(branch), radiance, sums);
+            let radiance = arrival.material().glow(surface.uv);
+            self.add(branch, PathClass::Emitted, (self.pictures_of_glow(branch), radiance), sums);
         }
         let Some(id) = scene.objects[arrival.hit.object.index()].emitter else { return };
         let light = &scene.lights[id.index()];
@@ -107,7 +109,7 @@ impl EyeWalk<'_> {
         }
         let (class, weight) = match branch.scattered {
             None => (PathClass::Emitted, 1.0),
-            Some(Scattered { straight: true, pdf: Some(pdf), count, point }) => {
+            Some(Scattered { straight: true, pdf: Some(pdf), count, point, .. }) => {
                 let at = LightPoint { point: surface.point, normal: surface.normal, error: surface.error };
                 let tree = self.context.plan.light_tree.as_ref();
                 let times = asked_times(tree, &Asking { point, normal: None }, id);
@@ -121,15 +123,15 @@ impl EyeWalk<'_> {
             Some(_) => return,
         };
         let pictures = self.pictures_of_light(branch, class, id);
-        self.add(class, pictures, branch.throughput * radiance * weight, sums);
+        self.add(branch, class, (pictures, radiance * weight), sums);
     }
 
     /// The photons at the first D: counted on the pixel's footprint, if this is it, else looked up.
     fn see_photons(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, sums: &mut PixelSums) {
-        let footprint = branch.main && self.view == Some(view_code(arrival.hit.sheet, branch.key));
+        let footprint = self.on_footprint(branch, arrival);
         if footprint && let Some(albedo) = bsdf.albedo() {
             // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
-            sums.gain += branch.throughput * albedo / std::f32::consts::PI;
+            sums.gain += branch.throughput * albedo / PI;
         }
         match self.lookups {
             Lookups::Nowhere => {}
@@ -138,6 +140,11 @@ impl EyeWalk<'_> {
                 self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums);
             }
         }
+    }
+
+    /// Whether a first D is the pixel's footprint.
+    fn on_footprint(&self, branch: &Branch, arrival: &Arrival<'_>) -> bool {
+        branch.main && self.view == Some(view_code(arrival.hit.sheet, branch.key))
     }
 
     /// The photons around the point, with a kernel of about a pixel times a factor; apart where they are in different
@@ -153,13 +160,13 @@ impl EyeWalk<'_> {
         let Some(photons) = self.context.photons else { return };
         let Some(language) = &self.context.plan.language else {
             let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), |_| true);
-            self.add(class, PICTURE, branch.throughput * radiance, sums);
+            self.add(branch, class, (PICTURE, radiance), sums);
             return;
         };
         for &pictures in language.parts(branch.trail) {
             let pick = |kind: Kind| language.pictures(branch.trail, kind) == pictures;
             let radiance = self.look_up(photons, branch, arrival, (bsdf, wider), pick);
-            self.add(class, pictures, branch.throughput * radiance, sums);
+            self.add(branch, class, (pictures, radiance), sums);
         }
     }
 
@@ -185,7 +192,8 @@ impl EyeWalk<'_> {
         let per_irradiance = |incoming: Incoming| {
             if pick(incoming.kind) { bsdf.per_irradiance(incoming.direction) } else { Vec3::ZERO }
         };
-        let map = &photons.maps[self.half];
+        let maps = if wider > 1.0 { photons.thinned.as_ref() } else { None };
+        let map = &maps.unwrap_or(&photons.maps)[self.half];
         self.counts.lookups += 1;
         match self.reach {
             Reach::Pixels(pixels) => {
@@ -207,13 +215,31 @@ impl EyeWalk<'_> {
         }
     }
 
-    /// Goes on from a D: if all paths are asked for, or if rays are what finds the lights in its highlights.
-    fn leave(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, seen: u32) {
-        let complete = self.wants_more(branch);
+    /// Goes on from a D: if all paths are asked for, or if rays are what finds the lights in its highlights. What is found
+    /// from the pixel's footprint is its irradiance, which smoothing knows how to average, unless rays are what
+    /// finds the caustics too.
+    fn leave(
+        &mut self,
+        branch: &Branch,
+        arrival: &Arrival<'_>,
+        (bsdf, seen): (&Bsdf, u32),
+        sums: &mut PixelSums,
+    ) {
+        // A sample that is followed once more for its photons has had its path.
+        let complete = self.wants_more(branch) && self.direct;
         let highlights = bsdf.albedo().is_none() && self.context.plan.lights_can_be_met;
         let first_of_all = seen == 1 && (highlights || self.goes_backward());
         if !(complete || first_of_all) || seen >= MOST_DIFFUSE {
             return;
+        }
+        let albedo = bsdf.albedo().filter(|albedo| albedo.max_element() > 0.0);
+        let to_footprint = match (branch.scattered, albedo) {
+            (Some(scattered), _) => scattered.to_footprint,
+            (None, Some(_)) => complete && !self.goes_backward() && self.on_footprint(branch, arrival),
+            (None, None) => false,
+        };
+        if seen == 1 && to_footprint {
+            sums.halves[self.half].departures += 1;
         }
         let stream = self.sample.branch(hash(branch.key, LEAVING_DIFFUSE));
         let Some(scattered) = bsdf.sample(stream.get_2d(DIRECTION_DIMENSION), stream.get(LOBE_DIMENSION))
@@ -221,6 +247,9 @@ impl EyeWalk<'_> {
             return;
         };
         let mut throughput = branch.throughput * scattered.weight;
+        if let Some(albedo) = albedo.filter(|_| seen == 1 && to_footprint) {
+            throughput = Vec3::splat(PI * scattered.weight.max_element() / albedo.max_element());
+        }
         if seen > ROULETTE_AFTER {
             let survival = scattered.weight.max_element().clamp(0.05, 0.95);
             if stream.get(ROULETTE_DIMENSION) >= survival {
@@ -240,7 +269,7 @@ impl EyeWalk<'_> {
             travelled: branch.travelled + arrival.hit.t,
             key: hash(branch.key, AFTER_DIFFUSE),
             main: false,
-            scattered: Some(Scattered { count: seen, point: surface.point, pdf, straight: true }),
+            scattered: Some(Scattered { count: seen, point: surface.point, pdf, straight: true, to_footprint }),
             ..*branch
         });
     }

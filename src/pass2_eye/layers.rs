@@ -44,18 +44,34 @@ impl PixelLayers {
 }
 
 impl EyeWalk<'_> {
-    /// Adds radiance of a class to the pictures that hold it.
+    /// Adds radiance of a class, where a branch has come to, to the pictures that hold it.
     #[inline]
-    pub(super) fn add(&mut self, class: PathClass, pictures: Pictures, radiance: Vec3, sums: &mut PixelSums) {
+    pub(super) fn add(
+        &mut self,
+        branch: &Branch,
+        class: PathClass,
+        (pictures, radiance): (Pictures, Vec3),
+        sums: &mut PixelSums,
+    ) {
+        let value = branch.throughput * radiance;
+        let half = self.half;
+        let to_footprint = branch.scattered.is_some_and(|scattered| scattered.to_footprint);
         if pictures & PICTURE != 0 {
-            sums.halves[self.half].classes.add(class, radiance);
+            let sums = &mut sums.halves[half];
+            if to_footprint { sums.indirect += value } else { sums.classes.add(class, value) }
         }
         if pictures & !PICTURE == 0 || (self.layers.caustics_only && class != PathClass::Caustic) {
             return;
         }
         let looked_up = class == PathClass::Caustic && self.context.plan.caustics != Some(Caustics::Backward);
         self.layers.add(pictures, |layer| {
-            if looked_up { layer.looked_up += radiance } else { layer.sampled += radiance }
+            let sum = match class {
+                _ if to_footprint => &mut layer.indirect[half],
+                PathClass::Indirect => &mut layer.bounced,
+                PathClass::Caustic if looked_up => &mut layer.looked_up,
+                PathClass::Emitted | PathClass::Direct | PathClass::Caustic => &mut layer.sampled,
+            };
+            *sum += value;
         });
     }
 
@@ -99,7 +115,8 @@ impl EyeWalk<'_> {
     #[inline]
     pub(super) fn wants_more(&self, branch: &Branch) -> bool {
         let plan = self.context.plan;
-        plan.classes.contains(PathClass::Indirect)
+        self.goes_on
+            && plan.classes.contains(PathClass::Indirect)
             && plan.language.as_ref().is_none_or(|language| language.goes_on(branch.trail))
     }
 

@@ -150,9 +150,12 @@ fn trace_pixel(
         Some(_) => Lookups::OffFootprint,
     };
     let gathering = lookups_of_round(context, lookups, index);
-    let first = context.film.pixels()[index].samples;
-    let count = context.effort.samples(index).max(gathering);
-    let mut sums = PixelSums { samples: count, ..PixelSums::default() };
+    let PixelSums { samples: sampled, paths: gone, .. } = context.film.pixels()[index];
+    let goes_on = context.plan.classes.contains(PathClass::Indirect);
+    let paths = if goes_on { context.effort.paths(index) } else { 0 };
+    let count = context.effort.samples(index).max(gathering).max(paths);
+    let mut sums = PixelSums { samples: count, paths, ..PixelSums::default() };
+    walk.counts.paths += 2 * u64::from(paths);
     walk.layers.clear();
     for half in 0..2 {
         if let (Some(footprint), Some(photons)) = (footprint, context.photons.filter(|_| gathers)) {
@@ -174,10 +177,18 @@ fn trace_pixel(
             }
         }
         let seed = pixel_seed(context.scene.render.seed, x, y, half);
+        // Those that look photons up lie anywhere in the round: a fixed place would be a fixed part of the sequence, and
+        // so of the pixel.
+        let turn = (hash(seed, u64::from(sampled)) % u64::from(count.max(1))) as u32;
         for i in 0..count {
-            let sample = SamplePoint::new(seed, first.wrapping_add(i));
+            // Paths have a sequence of their own: one of every few points of another would not be evenly spread.
+            let sample = match i.checked_sub(paths) {
+                None => SamplePoint::new(hash(seed, PATHS), gone.wrapping_add(i)),
+                Some(other) => SamplePoint::new(seed, (sampled - gone).wrapping_add(other)),
+            };
+            walk.goes_on = i < paths;
             let raster = Vec2::new(x as f32, y as f32) + sample.get_2d(0);
-            let lookups = if i < gathering { lookups } else { Lookups::Nowhere };
+            let lookups = if (i + turn) % count < gathering { lookups } else { Lookups::Nowhere };
             let view = footprint.map(|f| f.view);
             if context.plan.moves {
                 let photons = context.photons.filter(|_| lookups != Lookups::Nowhere);
@@ -196,6 +207,9 @@ fn trace_pixel(
     }
     sums
 }
+
+/// Tells the sequence of the samples that go on as paths.
+const PATHS: u64 = 0x009a_7475;
 
 /// Look-ups of a pixel at a border, per half, for each of the plan's blocks that a round traces.
 const BORDER_LOOKUPS: u32 = 4;

@@ -50,6 +50,10 @@ pub struct EyeCounts {
     pub short_lookups: u64,
     /// Branches ended by the bounce limit.
     pub cut: u64,
+    /// Paths that went on from a first D.
+    pub paths: u64,
+    /// Rays among those above that they needed beyond that D.
+    pub path_rays: u64,
 }
 
 impl EyeCounts {
@@ -60,6 +64,8 @@ impl EyeCounts {
         self.lookups += other.lookups;
         self.short_lookups += other.short_lookups;
         self.cut += other.cut;
+        self.paths += other.paths;
+        self.path_rays += other.path_rays;
     }
 }
 
@@ -88,6 +94,8 @@ pub(super) struct EyeWalk<'a> {
     /// When it is followed, and whether it adds light straight from the lights.
     pub(super) time: f32,
     pub(super) direct: bool,
+    /// Whether it goes on from the first D as a path, if such are asked for.
+    pub(super) goes_on: bool,
     /// What the pixel gathers for its named layers.
     pub(super) layers: PixelLayers,
     pub(super) counts: EyeCounts,
@@ -127,6 +135,8 @@ pub(super) struct Scattered {
     pub(super) pdf: Option<f32>,
     /// Nothing but the D lies between it and the ray: no S.
     pub(super) straight: bool,
+    /// The first D was the pixel's footprint: throughput counts the irradiance there, not the radiance that is seen.
+    pub(super) to_footprint: bool,
 }
 
 impl<'a> EyeWalk<'a> {
@@ -143,6 +153,7 @@ impl<'a> EyeWalk<'a> {
             view: None,
             time: 0.0,
             direct: true,
+            goes_on: false,
             layers: PixelLayers::new(context.plan.layer_names.len()),
             counts: EyeCounts::default(),
         }
@@ -200,6 +211,7 @@ impl<'a> EyeWalk<'a> {
     fn follow(&mut self, mut branch: Branch, sums: &mut PixelSums) {
         let scene = self.context.scene;
         self.counts.eye_rays += 1;
+        self.count_rays(&branch, 1);
         let Some(hit) = scene.geometry.closest_hit(&branch.ray) else {
             branch.throughput *= transmittance(branch.media.absorption(scene), f32::INFINITY);
             self.escape(&branch, sums);
@@ -214,6 +226,13 @@ impl<'a> EyeWalk<'a> {
         let pick = self.sample.branch(branch.key);
         let interaction = arrival.interact(|| spectrum::pick(pick.get(WAVELENGTH_DIMENSION)));
         self.scatter(&branch, &arrival, &interaction);
+    }
+
+    /// Counts the rays that a path needs beyond its first D.
+    pub(super) fn count_rays(&mut self, branch: &Branch, rays: u64) {
+        if self.goes_on && branch.scattered.is_some() {
+            self.counts.path_rays += rays;
+        }
     }
 
     /// Puts the ways that leave an S onto the stack.
@@ -293,7 +312,7 @@ impl<'a> EyeWalk<'a> {
     /// it is the scattered rays' only where highlights are sharp.
     fn escape(&mut self, branch: &Branch, sums: &mut PixelSums) {
         let (environment, direction) = (&self.context.scene.environment, branch.ray.direction);
-        let radiance = branch.throughput * environment.radiance(direction);
+        let radiance = environment.radiance(direction);
         let (class, weight) = match branch.scattered {
             None => (PathClass::Emitted, 1.0),
             Some(Scattered { straight: true, pdf: Some(pdf), count, .. }) => {
@@ -305,6 +324,6 @@ impl<'a> EyeWalk<'a> {
             }
             Some(_) => return,
         };
-        self.add(class, self.pictures_of_environment(branch, class), radiance * weight, sums);
+        self.add(branch, class, (self.pictures_of_environment(branch, class), radiance * weight), sums);
     }
 }

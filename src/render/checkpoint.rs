@@ -9,7 +9,7 @@ use glam::DVec3;
 use std::sync::Arc;
 
 /// First bytes of a checkpoint; the digit is the version of the layout.
-const MAGIC: &[u8; 12] = b"nephroid-cp3";
+const MAGIC: &[u8; 12] = b"nephroid-cp4";
 
 /// Why a checkpoint cannot be continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -31,8 +31,9 @@ impl Render {
             put_f64(&mut out, time.wall);
             put_f64(&mut out, time.cpu);
         }
-        let EyeCounts { eye_rays, shadow_rays, lookups, short_lookups, cut } = self.eye;
-        for count in [eye_rays, shadow_rays, lookups, short_lookups, cut, self.windows.len() as u64] {
+        let EyeCounts { eye_rays, shadow_rays, lookups, short_lookups, cut, paths, path_rays } = self.eye;
+        let windows = self.windows.len() as u64;
+        for count in [eye_rays, shadow_rays, lookups, short_lookups, cut, paths, path_rays, windows] {
             put_u64(&mut out, count);
         }
         for tally in &self.windows {
@@ -42,6 +43,7 @@ impl Render {
             out.extend(count.to_le_bytes());
         }
         out.extend(&self.effort.samples);
+        out.extend(&self.effort.paths);
         // A non-negative float's bits plus one: zero means none.
         let error = self.error.map_or(0, |e| e.to_bits() + 1);
         out.extend(error.to_le_bytes());
@@ -73,6 +75,8 @@ impl Render {
             lookups: take_u64(&mut bytes)?,
             short_lookups: take_u64(&mut bytes)?,
             cut: take_u64(&mut bytes)?,
+            paths: take_u64(&mut bytes)?,
+            path_rays: take_u64(&mut bytes)?,
         };
         if take_u64(&mut bytes)? != self.windows.len() as u64 {
             return None;
@@ -83,9 +87,11 @@ impl Render {
         self.blocks = take_u32(&mut bytes)?;
         self.effort.photon_shift = take_u32(&mut bytes)?.min(self.plan.most_photon_shift());
         let pixels = take_u32(&mut bytes)? as usize;
-        let (counts, rest) = bytes.split_at_checked(pixels)?;
-        self.effort.samples = counts.to_vec();
-        bytes = rest;
+        for counts in [&mut self.effort.samples, &mut self.effort.paths] {
+            let (values, rest) = bytes.split_at_checked(pixels)?;
+            *counts = values.to_vec();
+            bytes = rest;
+        }
         self.error = take_u32(&mut bytes)?.checked_sub(1).map(f32::from_bits);
         self.film = self.film.read(bytes)?;
         Some(())

@@ -9,6 +9,7 @@ use crate::pass1_light::RoundPhotons;
 use crate::pass2_eye::{self, EyeContext, EyeCounts};
 use crate::picture::{Picture, PixelError};
 use crate::sampling::hash;
+use crate::smooth::Smoothing;
 
 /// True for 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, …: at these numbers of rounds the error is estimated and the
 /// render may stop by it. Between them the picture gains too little to be worth the estimate.
@@ -26,9 +27,9 @@ impl Render {
         eye: &mut EyeCounts,
         control: &Control,
     ) -> Result<Film, RenderError> {
-        let errors = Picture::with_smoothing(&film, &self.footprints, None).errors();
-        let samples: Vec<u32> = film.pixels().iter().map(|p| p.samples).collect();
-        let measured = self.measured(&film, (&errors, &samples), eye);
+        let smoothing = Smoothing::expected(&self.smoothable);
+        let errors = Picture::with_smoothing(&film, &self.footprints, &smoothing).errors();
+        let measured = self.measured(&film, &errors, eye);
         let effort = Effort::second_look(&measured, hash(self.scene.render.seed, u64::MAX));
         let context = EyeContext {
             scene: &self.scene,
@@ -47,22 +48,22 @@ impl Render {
     }
 
     /// What decides on the effort.
-    fn measured<'a>(
-        &self,
-        film: &Film,
-        (errors, samples): (&'a [PixelError], &'a [u32]),
-        eye: &EyeCounts,
-    ) -> Measured<'a> {
+    fn measured<'a>(&self, film: &Film, errors: &'a [PixelError], eye: &EyeCounts) -> Measured<'a> {
+        let samples: Vec<u32> = film.pixels().iter().map(|p| p.samples).collect();
+        let paths: Vec<u32> = film.pixels().iter().map(|p| p.paths).collect();
         let sampled: u64 = samples.iter().map(|&n| 2 * u64::from(n)).sum();
+        let plain_rays = eye.eye_rays + eye.shadow_rays - eye.path_rays;
         let photon_rays: u64 = self.windows.iter().map(|t| t.rays).sum();
         let weight = film.photon_weight();
         Measured {
             errors,
             width: film.size().0,
             samples,
+            paths,
             photon_weight: weight,
             rays_per_block: if weight > 0.0 { photon_rays as f32 / weight } else { 0.0 },
-            rays_per_sample: (eye.eye_rays + eye.shadow_rays) as f32 / sampled.max(1) as f32,
+            rays_per_sample: plain_rays as f32 / sampled.max(1) as f32,
+            rays_per_path: eye.path_rays as f32 / eye.paths.max(1) as f32,
         }
     }
 
@@ -73,8 +74,7 @@ impl Render {
         }
         let picture = Picture::new(&self.film, &self.footprints);
         let errors = picture.errors();
-        let samples: Vec<u32> = self.film.pixels().iter().map(|p| p.samples).collect();
-        let measured = self.measured(&self.film, (&errors, &samples), &self.eye);
+        let measured = self.measured(&self.film, &errors, &self.eye);
         let key = hash(self.scene.render.seed, u64::from(self.rounds()));
         // A round at most doubles what was done before: no single one overruns a limit of time by far.
         let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);

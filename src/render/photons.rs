@@ -4,6 +4,8 @@ use super::{Control, Render, RenderError};
 use crate::light_path::PathClass;
 use crate::pass1_light::{self, Blocks, RoundPhotons, Tally};
 use crate::pass2_eye::{self, Connected};
+use crate::radius::RadiusRule;
+use crate::sampling::hash;
 use crate::scene::Caustics;
 
 /// What pass 1 gives to pass 2.
@@ -33,7 +35,17 @@ impl Render {
             }
             Some(Caustics::Photons | Caustics::Backward) | None => (None, true),
         };
-        let photons = looked_up.then(|| lists.into_maps());
+        let photons = looked_up.then(|| lists.into_maps(self.thin_to()));
         Ok(Sent { photons, connected, tallies })
+    }
+
+    /// How many photons second D look up: over a kernel of 8 pixels each way about 25, if they were spread over the picture.
+    /// The path that leads to such a D is noisier than that. The classic radii look up all photons there are.
+    fn thin_to(&self) -> Option<(usize, u64)> {
+        const PIXELS_PER_PHOTON: usize = 8;
+        let wanted = self.plan.classes.contains(PathClass::Indirect) && self.plan.radius == RadiusRule::Pixel;
+        let (width, height) = self.film.size();
+        let key = hash(self.scene.render.seed, u64::from(self.rounds()));
+        wanted.then_some((width * height / PIXELS_PER_PHOTON, key))
     }
 }

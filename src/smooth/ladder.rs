@@ -1,7 +1,7 @@
 //! The ladder of widths over one segment, and the choice between them.
 
 use super::segment::Segment;
-use super::{Sample, mean_channel};
+use super::{Gathered, Sample, mean_channel};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -12,8 +12,8 @@ struct Level {
     boxes: &'static [usize],
 }
 
-/// From nothing to a standard deviation of 6.9 pixels. Two boxes make a tent, which is smooth enough.
-const LEVELS: [Level; 7] = [
+/// From nothing to a standard deviation of 17.6 pixels. Two boxes make a tent, which is smooth enough.
+const LEVELS: [Level; 9] = [
     Level { boxes: &[] },
     Level { boxes: &[1] },
     Level { boxes: &[1, 1] },
@@ -21,10 +21,20 @@ const LEVELS: [Level; 7] = [
     Level { boxes: &[3, 3] },
     Level { boxes: &[5, 5] },
     Level { boxes: &[8, 8] },
+    Level { boxes: &[13, 13] },
+    Level { boxes: &[21, 21] },
 ];
 
-/// How far the widest filter looks, in pixels.
+/// How far the widest filter for photons looks, in pixels.
 pub(super) const MOST_REACH: usize = 16;
+
+/// The widths to choose from. Caustics are seldom smooth enough for the widest.
+fn widths(gathered: Gathered) -> &'static [Level] {
+    match gathered {
+        Gathered::Photons => &LEVELS[..7],
+        Gathered::Indirect => &LEVELS,
+    }
+}
 
 impl Level {
     /// Variance of the filter in each direction, pixels²: (w² - 1)/12 per box of w pixels.
@@ -65,6 +75,8 @@ pub(super) struct Choice {
 /// One width: both halves filtered.
 struct Filtered {
     halves: [Vec<Vec3>; 2],
+    /// The filtered mask of known pixels: 0 where none is within reach.
+    share: Vec<Vec3>,
 }
 
 /// Sums over rectangles of a plane in constant time.
@@ -84,28 +96,30 @@ struct Cost {
 struct Costs<'a> {
     levels: &'a [Filtered],
     weights: &'a [f32],
+    /// 1 where irradiance is known, else 0.
+    mask: &'a [f32],
 }
 
 impl Ladder {
     /// Filters the segment at every width and chooses. `floor` is the radiance below which errors count
     /// as absolute.
-    pub(super) fn climb(segment: &Segment, samples: &[Sample], floor: f32) -> Self {
+    pub(super) fn climb(segment: &Segment, samples: &[Sample], (gathered, floor): (Gathered, f32)) -> Self {
         let area = segment.size.0 * segment.size.1;
         let mut mask = vec![0.0_f32; area];
         let mut raw = [vec![Vec3::ZERO; area], vec![Vec3::ZERO; area]];
         for &pixel in &segment.pixels {
             let local = segment.local(pixel);
-            mask[local] = 1.0;
+            mask[local] = f32::from(u8::from(samples[pixel as usize].known));
             for (plane, irradiance) in raw.iter_mut().zip(samples[pixel as usize].irradiance) {
                 plane[local] = irradiance;
             }
         }
         let levels: Vec<Filtered> =
-            LEVELS.par_iter().map(|level| filter(*level, &raw, &mask, segment.size)).collect();
+            widths(gathered).par_iter().map(|level| filter(*level, &raw, &mask, segment.size)).collect();
         let weights = weights(segment, samples, &levels[3], floor);
-        let costs = Costs { levels: &levels, weights: &weights };
+        let costs = Costs { levels: &levels, weights: &weights, mask: &mask };
         let sums: Vec<Cost> =
-            (0..LEVELS.len()).into_par_iter().map(|level| costs.sums(level, segment.size)).collect();
+            (0..levels.len()).into_par_iter().map(|level| costs.sums(level, segment.size)).collect();
         let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
         let mut choices = choose(&levels, &sums, &counts, &weights);
         estimate(&mut choices, &costs, &counts);
@@ -121,7 +135,7 @@ impl Ladder {
 /// the whole. `value` and `level` are by pixel of the picture; tells the result of each.
 pub(super) fn filter_part(
     segment: &Segment,
-    value: &[Vec3],
+    (value, samples): (&[Vec3], &[Sample]),
     level: &[u8],
     mut tell: impl FnMut(usize, Vec3),
 ) {
@@ -129,7 +143,8 @@ pub(super) fn filter_part(
     let (mut mask, mut raw) = (vec![0.0_f32; area], vec![Vec3::ZERO; area]);
     for &pixel in &segment.pixels {
         let local = segment.local(pixel);
-        (mask[local], raw[local]) = (1.0, value[pixel as usize]);
+        mask[local] = f32::from(u8::from(samples[pixel as usize].known));
+        raw[local] = value[pixel as usize];
     }
     for (number, width) in LEVELS.iter().enumerate() {
         let chosen = || segment.pixels.iter().filter(|&&pixel| usize::from(level[pixel as usize]) == number);
@@ -137,7 +152,7 @@ pub(super) fn filter_part(
             continue;
         }
         let share = shares(*width, &mask, segment.size);
-        let filtered = filter_plane(*width, raw.clone(), (&share, &mask), segment.size);
+        let filtered = filter_plane(*width, raw.clone(), &share, segment.size);
         chosen().for_each(|&pixel| tell(pixel as usize, filtered[segment.local(pixel)]));
     }
 }
@@ -168,7 +183,7 @@ impl Costs<'_> {
         let ratio = if level == 0 { 0.0 } else { LEVELS[finer].variance() / LEVELS[level].variance() };
         let whole = (1.0 - ratio).powi(-2);
         let d = a - b;
-        let weight = self.weights[i];
+        let weight = self.weights[i] * self.mask[i];
         (mean_channel((a - fa) * (b - fb)) * whole * weight, 0.25 * mean_channel(d * d) * weight)
     }
 
@@ -184,7 +199,7 @@ impl Costs<'_> {
 /// From large windows to small, the width with the least estimated error; one choice for every 2 × 2 pixels.
 fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -> Vec<Choice> {
     let (width, height) = (counts.width, counts.height);
-    let widest = &levels[LEVELS.len() - 1].halves;
+    let widest = &levels[levels.len() - 1].halves;
     let lit = |i: usize| weights[i] > 0.0 && (widest[0][i] != Vec3::ZERO || widest[1][i] != Vec3::ZERO);
     let row_pairs: Vec<Vec<Choice>> = (0..height.div_ceil(2))
         .into_par_iter()
@@ -198,8 +213,11 @@ fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -
                     continue;
                 }
                 let level = choose_level(costs, counts, (x, rows.start));
-                let halves = &levels[level].halves;
                 for i in block.filter(|&i| weights[i] > 0.0) {
+                    // Where nothing is known, the next width that reaches something.
+                    let reaches = |&level: &usize| levels[level].share[i].x > 0.0;
+                    let level = (level..levels.len()).find(reaches).unwrap_or(level);
+                    let halves = &levels[level].halves;
                     let irradiance = 0.5 * (halves[0][i] + halves[1][i]);
                     choices[i - rows.start * width] =
                         Choice { irradiance, squared_error: 0.0, level: level as u8 };
@@ -221,7 +239,7 @@ fn estimate(choices: &mut [Choice], costs: &Costs<'_>, counts: &Sums) {
     let noise = Sums::new(size, at.iter().map(|c| f64::from(c.1)));
     for (i, choice) in choices.iter_mut().enumerate().filter(|(i, _)| costs.weights[*i] > 0.0) {
         let at = (i % size.0, i / size.0);
-        let around = |sums: &Sums| (sums.around(at, ESTIMATE) / counts.around(at, ESTIMATE)) as f32;
+        let around = |sums: &Sums| (sums.around(at, ESTIMATE) / counts.around(at, ESTIMATE).max(1.0)) as f32;
         choice.squared_error = (around(&bias).max(0.0) + around(&noise)) / costs.weights[i];
     }
 }
@@ -236,10 +254,10 @@ fn choose_level(costs: &[Cost], counts: &Sums, at: (usize, usize)) -> usize {
             let near = window.max(LEVELS[l].reach());
             // Wide filters leave noise that is alike over their reach: look at several of it.
             let far = window.max(3 * LEVELS[l].reach());
-            bias = bias.max((cost.bias.around(at, near) / counts.around(at, near)) as f32);
-            estimates[l] = bias + (cost.noise.around(at, far) / counts.around(at, far)) as f32;
+            bias = bias.max((cost.bias.around(at, near) / counts.around(at, near).max(1.0)) as f32);
+            estimates[l] = bias + (cost.noise.around(at, far) / counts.around(at, far).max(1.0)) as f32;
         }
-        let best = (0..LEVELS.len()).min_by(|&a, &b| estimates[a].total_cmp(&estimates[b])).unwrap_or(0);
+        let best = (0..costs.len()).min_by(|&a, &b| estimates[a].total_cmp(&estimates[b])).unwrap_or(0);
         if step == 0 || estimates[best] < OVERRULE * estimates[chosen] {
             chosen = best;
         }
@@ -247,14 +265,11 @@ fn choose_level(costs: &[Cost], counts: &Sums, at: (usize, usize)) -> usize {
     chosen
 }
 
-/// Filters both halves within the mask: sums of masked values over sums of the mask, so that nothing is lost
+/// Filters both halves within the mask, and to where it reaches: sums of masked values over sums of the mask, so that nothing is lost
 /// at the segment's border.
 fn filter(level: Level, raw: &[Vec<Vec3>; 2], mask: &[f32], size: (usize, usize)) -> Filtered {
-    if level.boxes.is_empty() {
-        return Filtered { halves: raw.clone() };
-    }
     let share = shares(level, mask, size);
-    Filtered { halves: raw.clone().map(|plane| filter_plane(level, plane, (&share, mask), size)) }
+    Filtered { halves: raw.clone().map(|plane| filter_plane(level, plane, &share, size)), share }
 }
 
 /// The filtered mask.
@@ -267,12 +282,12 @@ fn shares(level: Level, mask: &[f32], size: (usize, usize)) -> Vec<Vec3> {
 fn filter_plane(
     level: Level,
     mut plane: Vec<Vec3>,
-    (share, mask): (&[Vec3], &[f32]),
+    share: &[Vec3],
     size: (usize, usize),
 ) -> Vec<Vec3> {
     level.boxes.iter().for_each(|&b| box_filter(&mut plane, b, size));
-    for ((value, share), inside) in plane.iter_mut().zip(share).zip(mask) {
-        *value = if *inside > 0.0 { *value / share.x } else { Vec3::ZERO };
+    for (value, share) in plane.iter_mut().zip(share) {
+        *value = if share.x > 0.0 { *value / share.x } else { Vec3::ZERO };
     }
     plane
 }
