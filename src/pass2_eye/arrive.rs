@@ -12,8 +12,9 @@ use crate::pass1_light::{RoundPhotons, Source};
 use crate::photon_map::{Incoming, Lookup, Nearest};
 use crate::plan::Asking;
 use crate::radius::{PIXEL, Reach};
-use crate::sampling::hash;
+use crate::sampling::{WAVELENGTH_DIMENSION, hash};
 use crate::scene::LightPoint;
+use crate::spectrum;
 use glam::Vec3;
 
 /// Sobol dimensions, of a stream of its own, that draw the direction in which a path goes on, its lobe, and whether.
@@ -41,7 +42,8 @@ impl EyeWalk<'_> {
     /// Adds up what a surface shows; true if it has a D part.
     pub(super) fn arrive(&mut self, branch: &Branch, arrival: &Arrival<'_>, sums: &mut PixelSums) -> bool {
         self.see_emitter(branch, arrival, sums);
-        let Some(bsdf) = Bsdf::new(arrival) else { return false };
+        let line = || spectrum::pick(self.sample.branch(branch.key).get(WAVELENGTH_DIMENSION));
+        let Some(bsdf) = Bsdf::new(arrival, line) else { return false };
         let seen = branch.scattered.map_or(0, |s| s.count) + 1;
         if seen > 1 && !self.wants_more(branch) {
             // The paths asked for end at the last D.
@@ -111,7 +113,7 @@ impl EyeWalk<'_> {
                 let at = LightPoint { point: surface.point, normal: surface.normal, error: surface.error };
                 let tree = self.context.plan.light_tree.as_ref();
                 let times = asked_times(tree, &Asking { point, normal: None }, id);
-                let other = density_toward(light, point, &at).unwrap_or(0.0) * times;
+                let other = density_toward(light, (point, branch.ray.time), &at).unwrap_or(0.0) * times;
                 (PathClass::with_light_after(count), power_heuristic(pdf, other))
             }
             // Light over mirrors or glass: the photons' part, unless rays are to find it.
@@ -236,6 +238,7 @@ impl EyeWalk<'_> {
             ray: branch.ray.continue_from(origin, direction),
             throughput,
             media: *bsdf.media_toward(direction),
+            wavelength: branch.wavelength.or(scattered.wavelength),
             bounces: branch.bounces + 1,
             travelled: branch.travelled + arrival.hit.t,
             key: hash(branch.key, AFTER_DIFFUSE),
