@@ -126,20 +126,41 @@ impl EyeWalk<'_> {
         self.add(class, pictures, branch.throughput * radiance * weight, sums);
     }
 
-    /// The photons at the first D: counted on the pixel's footprint, if this is it, else looked up.
+    /// The photons at the first D: counted on the pixel's footprint, if this is it, or on those beside it, else looked up.
     fn see_photons(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, sums: &mut PixelSums) {
         let footprint = branch.main && self.view == Some(view_code(arrival.hit.sheet, branch.key));
         if footprint && let Some(albedo) = bsdf.albedo() {
             // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
             sums.gain += branch.throughput * albedo / std::f32::consts::PI;
         }
-        match self.lookups {
+        let lookups = self.lookups;
+        match lookups {
             Lookups::Nowhere => {}
             Lookups::OffFootprint if footprint => {}
+            Lookups::Everywhere if self.see_beside(branch, arrival, bsdf, sums) => {}
             Lookups::OffFootprint | Lookups::Everywhere => {
                 self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums);
             }
         }
+    }
+
+    /// The light of the pixels beside this one, if they show the same surface; false if they do not.
+    fn see_beside(
+        &mut self,
+        branch: &Branch,
+        arrival: &Arrival<'_>,
+        bsdf: &Bsdf,
+        sums: &mut PixelSums,
+    ) -> bool {
+        let Some(albedo) = bsdf.albedo().filter(|_| branch.main) else { return false };
+        let gain = branch.throughput * albedo / std::f32::consts::PI;
+        let beside = std::mem::take(&mut self.beside);
+        let at = (arrival.hit.surface.point, bsdf.geometric);
+        let seen = beside.irradiance(view_code(arrival.hit.sheet, branch.key), at, |pictures, irradiance| {
+            self.add(PathClass::Caustic, pictures, gain * irradiance, sums);
+        });
+        self.beside = beside;
+        seen
     }
 
     /// The photons around the point, with a kernel of about a pixel times a factor; apart where they are in different
