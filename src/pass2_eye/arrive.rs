@@ -4,6 +4,7 @@
 use super::direct::{Receiver, asked_times, density_toward, direct_light, power_heuristic};
 use super::footprint::view_code;
 use super::specular::{Branch, EyeWalk, Lookups, Scattered};
+use super::walls::Walls;
 use crate::bsdf::Bsdf;
 use crate::film::PixelSums;
 use crate::light_path::{Bounce, Kind, PICTURE, PathClass};
@@ -31,6 +32,9 @@ const AFTER_DIFFUSE: u64 = 0x5eed_0d1f;
 /// Photons are looked up over this many times the pixel's width at a D that is seen by another: what is blurred there
 /// is blurred once more by the first.
 const INDIRECT_WIDTH: f32 = 8.0;
+
+/// In a crease of which hardly anything is seen a density would be noise alone.
+const LEAST_MASS: f32 = 0.25;
 
 /// Paths of fewer D do not play roulette.
 const ROULETTE_AFTER: u32 = 2;
@@ -126,41 +130,20 @@ impl EyeWalk<'_> {
         self.add(class, pictures, branch.throughput * radiance * weight, sums);
     }
 
-    /// The photons at the first D: counted on the pixel's footprint, if this is it, or on those beside it, else looked up.
+    /// The photons at the first D: counted on the pixel's footprint, if this is it, else looked up.
     fn see_photons(&mut self, branch: &Branch, arrival: &Arrival<'_>, bsdf: &Bsdf, sums: &mut PixelSums) {
         let footprint = branch.main && self.view == Some(view_code(arrival.hit.sheet, branch.key));
         if footprint && let Some(albedo) = bsdf.albedo() {
             // Radiance leaving a Lambertian surface is albedo / π times its irradiance.
             sums.gain += branch.throughput * albedo / std::f32::consts::PI;
         }
-        let lookups = self.lookups;
-        match lookups {
+        match self.lookups {
             Lookups::Nowhere => {}
             Lookups::OffFootprint if footprint => {}
-            Lookups::Everywhere if self.see_beside(branch, arrival, bsdf, sums) => {}
             Lookups::OffFootprint | Lookups::Everywhere => {
                 self.see_looked_up(branch, arrival, (bsdf, 1.0), PathClass::Caustic, sums);
             }
         }
-    }
-
-    /// The light of the pixels beside this one, if they show the same surface; false if they do not.
-    fn see_beside(
-        &mut self,
-        branch: &Branch,
-        arrival: &Arrival<'_>,
-        bsdf: &Bsdf,
-        sums: &mut PixelSums,
-    ) -> bool {
-        let Some(albedo) = bsdf.albedo().filter(|_| branch.main) else { return false };
-        let gain = branch.throughput * albedo / std::f32::consts::PI;
-        let beside = std::mem::take(&mut self.beside);
-        let at = (arrival.hit.surface.point, bsdf.geometric);
-        let seen = beside.irradiance(view_code(arrival.hit.sheet, branch.key), at, |pictures, irradiance| {
-            self.add(PathClass::Caustic, pictures, gain * irradiance, sums);
-        });
-        self.beside = beside;
-        seen
     }
 
     /// The photons around the point, with a kernel of about a pixel times a factor; apart where they are in different
@@ -208,17 +191,26 @@ impl EyeWalk<'_> {
         let per_irradiance = |incoming: Incoming| {
             if pick(incoming.kind) { bsdf.per_irradiance(incoming.direction) } else { Vec3::ZERO }
         };
+        let geometry = &self.context.scene.geometry;
         let map = &photons.maps[self.half];
         self.counts.lookups += 1;
         match self.reach {
             Reach::Pixels(pixels) => {
                 let radius = pixel * pixels * wider;
-                let radiance = map.radiance(&within(radius), per_irradiance);
+                let radiance = map.radiance(&within(radius), &per_irradiance);
                 if radiance == Vec3::ZERO {
                     return radiance;
                 }
-                let geometry = &self.context.scene.geometry;
-                radiance / geometry.kernel_mass(hit.sheet, point, radius, branch.ray.time)
+                let time = branch.ray.time;
+                let mass = geometry.kernel_mass(hit.sheet, point, radius, time);
+                let at = (&hit.surface, bsdf.geometric);
+                let walls = || Walls::around(geometry, at, radius, time);
+                let Some(walls) = self.border.then(walls).flatten() else { return radiance / mass };
+                let seen = |incoming: Incoming| {
+                    if walls.reach(incoming.offset) { per_irradiance(incoming) } else { Vec3::ZERO }
+                };
+                // Where a surface ends at a wall both say so.
+                map.radiance(&within(radius), seen) / mass.min(walls.mass(radius)).max(LEAST_MASS)
             }
             Reach::Disc(radius) => map.disc_radiance(&within(radius), per_irradiance),
             Reach::Nearest { count, most } => {

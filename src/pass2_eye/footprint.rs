@@ -112,17 +112,13 @@ impl Footprints {
     /// True for a pixel without footprint beside one that has one: it shows an edge of something.
     #[must_use]
     pub fn at_border(&self, index: usize) -> bool {
-        self.pixels.get(index).is_some_and(Option::is_none) && self.around(index).next().is_some()
-    }
-
-    /// The pixels around one that have a footprint.
-    pub(super) fn around(&self, index: usize) -> impl Iterator<Item = (usize, &Footprint)> {
-        let (x, y) = (index % self.width.max(1), index / self.width.max(1));
-        let rows = y.saturating_sub(1)..(y + 2).min(self.pixels.len() / self.width.max(1));
-        let columns = move || x.saturating_sub(1)..(x + 2).min(self.width);
-        rows.flat_map(move |row| columns().map(move |column| row * self.width + column))
-            .filter(move |&i| i != index)
-            .filter_map(|i| Some((i, self.pixels.get(i)?.as_ref()?)))
+        if self.pixels.get(index).is_none_or(Option::is_some) {
+            return false;
+        }
+        let (x, y) = (index % self.width, index / self.width);
+        let columns = x.saturating_sub(1)..(x + 2).min(self.width);
+        let mut rows = y.saturating_sub(1)..(y + 2).min(self.pixels.len() / self.width);
+        rows.any(|row| self.pixels[row * self.width..][columns.clone()].iter().any(Option::is_some))
     }
 
     /// True if any footprint is seen without any S between.

@@ -1,7 +1,6 @@
 //! Pass 2, `…E`: rays backward from the eye; each class of paths in its own layer.
 
 mod arrive;
-mod beside;
 mod direct;
 mod footprint;
 mod forward;
@@ -9,6 +8,7 @@ mod layers;
 mod outline;
 mod specular;
 mod spread;
+mod walls;
 
 pub use footprint::{Footprint, Footprints};
 pub use forward::{Connected, connect};
@@ -151,25 +151,28 @@ fn trace_pixel(
         Some(_) => Lookups::OffFootprint,
     };
     let gathering = lookups_of_round(context, lookups, index);
+    let border = gathers && context.footprints.at_border(index);
     let first = context.film.pixels()[index].samples;
     let count = context.effort.samples(index).max(gathering);
     let mut sums = PixelSums { samples: count, ..PixelSums::default() };
+    walk.border = border;
     walk.layers.clear();
     for half in 0..2 {
-        walk.beside.clear();
-        if let Some(photons) = context.photons.filter(|_| gathers) {
-            let light = LightOnPixels { plan: context.plan, photons, direct, half: half as usize };
-            if let Some(footprint) = footprint {
-                walk.counts.lookups += light.on((index, footprint), &mut |pictures, irradiance| {
-                    if pictures & PICTURE != 0 {
-                        sums.halves[half as usize].irradiance += irradiance;
-                    }
-                    walk.layers.add(pictures, |layer| layer.irradiance += irradiance);
-                });
-            } else {
-                for pixel in context.footprints.around(index) {
-                    let counts = &mut walk.counts;
-                    walk.beside.add(pixel.1, |bring| counts.lookups += light.on(pixel, bring));
+        if let (Some(footprint), Some(photons)) = (footprint, context.photons.filter(|_| gathers)) {
+            let bring = &mut |pictures: Pictures, irradiance: Vec3| {
+                if pictures & PICTURE != 0 {
+                    sums.halves[half as usize].irradiance += irradiance;
+                }
+                walk.layers.add(pictures, |layer| layer.irradiance += irradiance);
+            };
+            match direct.filter(|_| footprint.direct) {
+                Some(direct) => {
+                    let seen = &direct[half as usize];
+                    seen.iter().for_each(|(pictures, part)| bring(*pictures, part.get(index)));
+                }
+                None => {
+                    on_footprint(context.plan, &photons.maps[half as usize], footprint, bring);
+                    walk.counts.lookups += 1;
                 }
             }
         }
@@ -216,33 +219,8 @@ fn lookups_of_round(context: &EyeContext<'_>, lookups: Lookups, index: usize) ->
     }
 }
 
-/// What one half of a round's photons bring to the pixels.
-struct LightOnPixels<'a> {
-    plan: &'a Plan,
-    photons: &'a RoundPhotons,
-    direct: Option<&'a [Vec<Seen>; 2]>,
-    half: usize,
-}
-
-impl LightOnPixels<'_> {
-    /// Tells the irradiance of a pixel, for each set of pictures that it gives to. Also the number of look-ups.
-    fn on(&self, (index, footprint): (usize, &Footprint), bring: &mut dyn FnMut(Pictures, Vec3)) -> u64 {
-        match self.direct.filter(|_| footprint.direct) {
-            Some(direct) => {
-                let seen = &direct[self.half];
-                seen.iter().for_each(|(pictures, part)| bring(*pictures, part.get(index)));
-                0
-            }
-            None => {
-                on_footprint(self.plan, &self.photons.maps[self.half], footprint, bring);
-                1
-            }
-        }
-    }
-}
-
 /// The irradiance that photons bring to a footprint, for each set of pictures that they give to.
-fn on_footprint(plan: &Plan, map: &PhotonMap, footprint: &Footprint, bring: &mut dyn FnMut(Pictures, Vec3)) {
+fn on_footprint(plan: &Plan, map: &PhotonMap, footprint: &Footprint, bring: &mut impl FnMut(Pictures, Vec3)) {
     let Some(language) = &plan.language else {
         bring(PICTURE, map.flux_within(footprint) / footprint.area);
         return;

@@ -6,7 +6,6 @@
 //! still add.
 
 use super::EyeContext;
-use super::beside::Beside;
 use super::direct::{environment_density, power_heuristic};
 use super::layers::PixelLayers;
 use crate::film::PixelSums;
@@ -92,8 +91,8 @@ pub(super) struct EyeWalk<'a> {
     /// What the pixel gathers for its named layers.
     pub(super) layers: PixelLayers,
     pub(super) counts: EyeCounts,
-    /// What photons bring to the pixels beside one that has no footprint.
-    pub(super) beside: Beside,
+    /// Whether the pixel shows an edge of something: its look-ups may be at the foot of a wall.
+    pub(super) border: bool,
 }
 
 /// A ray on its way from the eye.
@@ -148,7 +147,7 @@ impl<'a> EyeWalk<'a> {
             direct: true,
             layers: PixelLayers::new(context.plan.layer_names.len()),
             counts: EyeCounts::default(),
-            beside: Beside::default(),
+            border: false,
         }
     }
 

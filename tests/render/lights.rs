@@ -224,10 +224,7 @@ fn beneath(objects: &Value, lights: &Value, ball: Option<&str>) -> Value {
         ball.map(|m| json!({ "type": "sphere", "material": m, "center": [0, 0.6, 0], "radius": 0.3 })),
     );
     all.extend(objects.as_array().unwrap().iter().cloned());
-    let mut value = scene(camera, json!(all), lights.clone());
-    // Small enough for the silhouette's pixels, which are lit as those beside them.
-    value["image"] = json!({ "width": 40, "height": 40 });
-    value
+    scene(camera, json!(all), lights.clone())
 }
 
 /// T25: whatever the light, a ball of index 1 is not there: photons bring exactly what it blocks for shadow rays.
@@ -240,9 +237,9 @@ fn t25_glass_of_index_one_is_not_there_for_any_light() {
         let found = over_seeds(|seed| mean(&render(&with, seed, 4, 13).image()));
         let error = T_LIMIT * found.standard_error.hypot(expected.standard_error);
         assert!(error < 0.05 * expected.mean, "{name}: too noisy: {found:?} {expected:?}");
-        // Pixels at the ball's silhouette, lit as those beside them, are off by so much together.
+        // The kernel's blur carries light over the shadow's edge in both directions alike.
         let difference = (found.mean - expected.mean).abs();
-        assert!(difference <= error + 3e-3 * expected.mean, "{name}: {found:?}, expected {expected:?}");
+        assert!(difference <= error + 1e-3 * expected.mean, "{name}: {found:?}, expected {expected:?}");
         let caustic = mean(&render(&with, 1, 4, 13).layer(PathClass::Caustic));
         assert!(
             caustic > 0.1 * expected.mean,
