@@ -197,7 +197,7 @@ impl EyeWalk<'_> {
         match self.reach {
             Reach::Pixels(pixels) => {
                 let radius = pixel * pixels * wider;
-                let radiance = map.radiance(&within(radius), &per_irradiance);
+                let radiance = map.radiance(&within(radius), per_irradiance);
                 if radiance == Vec3::ZERO {
                     return radiance;
                 }
