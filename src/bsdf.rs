@@ -9,6 +9,7 @@ use crate::media::Media;
 use crate::optics::Arrival;
 use crate::sampling::cosine_hemisphere;
 use crate::scene::Material;
+use crate::spectrum::Line;
 use arrayvec::ArrayVec;
 use glam::{Vec2, Vec3};
 use lobe::{Lobe, Local};
@@ -36,6 +37,8 @@ pub struct Bsdf {
     /// What the viewer is inside of, and what is on the other side.
     pub media: [Media; 2],
     transmits: bool,
+    /// The wavelength that was picked, if light that is let through is taken apart.
+    line: Option<Line>,
 }
 
 /// A lobe and how much of it there is.
@@ -67,18 +70,21 @@ pub struct BsdfSample {
     pub pdf: f32,
     /// On the other side of the surface.
     pub transmitted: bool,
+    /// The wavelength that light from there is of, μm, where the surface takes it apart; its weight is in `weight`.
+    pub wavelength: Option<f32>,
 }
 
 impl Bsdf {
     /// The D part of the surface that a ray, coming backward from the eye, arrives at; `None` if it scatters nothing.
+    /// `line` picks a wavelength where light of all is taken apart.
     #[must_use]
-    pub fn new(arrival: &Arrival<'_>) -> Option<Self> {
+    pub fn new(arrival: &Arrival<'_>, line: impl Fn() -> Line) -> Option<Self> {
         let material = arrival.material();
         if !material.has_diffuse() {
             return None;
         }
         let mut bsdf = Self::bare(&arrival.hit.surface, arrival.direction, arrival.media);
-        bsdf.add(material, 1.0, arrival);
+        bsdf.add(material, 1.0, arrival, &line);
         let total: f32 = bsdf.lobes.iter().map(|l| l.chance).sum();
         if total <= 0.0 {
             return None;
@@ -106,10 +112,11 @@ impl Bsdf {
             albedo: None,
             media: [media; 2],
             transmits: false,
+            line: None,
         }
     }
 
-    fn add(&mut self, material: &Material, share: f32, arrival: &Arrival<'_>) {
+    fn add(&mut self, material: &Material, share: f32, arrival: &Arrival<'_>, line: &impl Fn() -> Line) {
         let uv = arrival.hit.surface.uv;
         match material {
             Material::Diffuse { albedo } => self.push(Lobe::Lambert { albedo: albedo.eval(uv) }, share),
@@ -120,11 +127,15 @@ impl Bsdf {
                 self.push(Lobe::Metal { conductor: *conductor, alpha: alpha.get() }, share);
             }
             Material::Glass { alpha: Some(alpha), .. } => {
-                let interface = arrival.interface(arrival.wavelength);
-                if !interface.hidden {
-                    self.media = [interface.before, interface.after];
+                let known = arrival.interface(arrival.wavelength);
+                if !known.hidden {
+                    self.media = [known.before, known.after];
                     self.transmits = true;
-                    self.push(Lobe::glass(interface.eta, alpha.get()), share);
+                    self.line = (known.dispersive && arrival.wavelength.is_none()).then(line);
+                    let eta = self.line.map_or(known.eta, |l| arrival.interface(Some(l.wavelength)).eta);
+                    // What is reflected is not taken apart.
+                    let let_through = self.line.map_or(Vec3::ONE, |line| line.weight);
+                    self.push(Lobe::glass(eta, alpha.get(), let_through), share);
                 }
             }
             Material::Phong(phong) => {
@@ -134,7 +145,7 @@ impl Bsdf {
             }
             Material::Mix(mix) => {
                 for (part, amount) in mix.shares(uv) {
-                    self.add(part, share * amount, arrival);
+                    self.add(part, share * amount, arrival, line);
                 }
             }
         }
@@ -252,6 +263,7 @@ impl Bsdf {
             weight: value / pdf,
             pdf,
             transmitted,
+            wavelength: self.line.filter(|_| transmitted).map(|line| line.wavelength),
         })
     }
 }

@@ -171,8 +171,7 @@ impl Wanted {
             let columns = x.saturating_sub(WINDOW)..(x + WINDOW + 1).min(width);
             let rows = y.saturating_sub(WINDOW)..(y + WINDOW + 1).min(height);
             let count = (columns.len() * rows.len()) as f32;
-            let sum: f32 =
-                rows.map(|row| variance[row * width..][columns.clone()].iter().sum::<f32>()).sum();
+            let sum: f32 = rows.map(|row| variance[row * width..][columns.clone()].iter().sum::<f32>()).sum();
             sum / count
         };
         let cost = rays.max(1.0);

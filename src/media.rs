@@ -152,7 +152,7 @@ impl Media {
         inside.into_iter().rev().fold(Self::default(), |media, material| media.with(material))
     }
 
-    /// What a light is inside of; one infinitely far away is in air.
+    /// What a light is inside of, when the shutter opens if it moves; one infinitely far away is in air.
     #[must_use]
     pub fn around_light(scene: &Scene, light: &Light) -> Self {
         match light {
@@ -163,7 +163,8 @@ impl Media {
             Light::Disk(disk) => Self::around(scene, disk.center),
             Light::Sphere(sphere) => Self::around(scene, sphere.center),
             Light::Mesh(mesh) => {
-                mesh.sample(Vec2::splat(0.5)).map_or_else(Self::default, |at| Self::around(scene, at.point))
+                let middle = mesh.sample(0.0, Vec2::splat(0.5));
+                middle.map_or_else(Self::default, |(at, _)| Self::around(scene, at.point))
             }
         }
     }

@@ -63,6 +63,8 @@ pub struct Incoming {
     pub direction: Vec3,
     /// Which light it is, and what it has met.
     pub kind: Kind,
+    /// Where it lies, off the point that is looked from; 0 in the classic estimates, which do not ask.
+    pub offset: Vec3,
 }
 
 /// Where and how wide to look.
@@ -131,15 +133,16 @@ impl PhotonMap {
     pub fn radiance(&self, lookup: &Lookup, per_irradiance: impl Fn(Incoming) -> Vec3) -> Vec3 {
         let radius2 = lookup.radius * lookup.radius;
         let mut sum = Vec3::ZERO;
-        self.visit(lookup, lookup.radius, |distance2, photon| {
+        self.visit(lookup, lookup.radius, |distance2, offset, photon| {
             let power = Vec3::from_array(photon.power) * (1.0 - distance2 / radius2);
-            sum += power * per_irradiance(photon.incoming());
+            sum += power * per_irradiance(photon.incoming(offset));
         });
         if sum == Vec3::ZERO { sum } else { sum * (2.0 / (std::f32::consts::PI * radius2)) }
     }
 
-    /// Visits the photons of a look-up that are no further away than `within`, with their squared distances.
-    fn visit(&self, lookup: &Lookup, within: f32, mut photon_at: impl FnMut(f32, Stored)) {
+    /// Visits the photons of a look-up that are no further away than `within`, with their squared distances and where they
+    /// lie off its point, in the tree's frame.
+    fn visit(&self, lookup: &Lookup, within: f32, mut photon_at: impl FnMut(f32, Vec3, Stored)) {
         let Some(tree) = &self.tree else { return };
         let radius2 = lookup.radius * lookup.radius;
         // A radius of no size (or NaN) holds no photons and has no density.
@@ -155,13 +158,14 @@ impl PhotonMap {
             .visit(|hit| {
                 let photon = hit.item;
                 let same_sheet = photon.sheet() == lookup.sheet.0;
-                let height = (Vec3::from_array(hit.point) - center).dot(normal);
+                let offset = Vec3::from_array(hit.point) - center;
+                let height = offset.dot(normal);
                 // The photon's plane may tilt by 45° over the kernel's radius at most.
                 let near_plane = height * height <= 0.5 * hit.distance + radius2 * 1e-4;
                 if same_sheet && near_plane && photon.is_aligned(lookup.normal) {
                     let travels = decode_direction(photon.direction);
                     if lookup.both_sides || travels.dot(lookup.normal) < 0.0 {
-                        photon_at(hit.distance, photon);
+                        photon_at(hit.distance, offset, photon);
                     }
                 }
             });
@@ -238,10 +242,11 @@ impl Stored {
         (self.place >> SHEETS.trailing_ones()) as Kind
     }
 
-    /// Where it came from.
+    /// Where it came from; `offset` is in the tree's frame.
     #[inline]
-    fn incoming(&self) -> Incoming {
-        Incoming { direction: -decode_direction(self.direction), kind: self.kind() }
+    fn incoming(&self, offset: Vec3) -> Incoming {
+        let offset = ROTATION.transpose() * offset;
+        Incoming { direction: -decode_direction(self.direction), kind: self.kind(), offset }
     }
 
     /// True if the photon's surface faces the same way, or the opposite.

@@ -218,10 +218,10 @@ impl Plan {
         let all = pilots.len();
         if pilots.iter().all(|p| p.tally.hit_caster == 0) {
             self.decide("pass 1", false, "no photons", "no light reaches a mirror or glass");
-            self.warn(
-                "no_photon_hit_specular",
-                format!("of {} pilot photons none reached a specular object", sent(&pilots)),
-            );
+            if reach::is_meant(scene) {
+                let message = format!("of {} pilot photons none reached a specular object", sent(&pilots));
+                self.warn("no_photon_hit_specular", message);
+            }
             return;
         }
         self.warnings.extend(reach::unreachable_specular(scene, &pilots));

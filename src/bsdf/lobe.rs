@@ -16,8 +16,9 @@ pub(super) enum Lobe {
     Highlight { k_s: Vec3, exponent: f32, form: Highlight },
     /// Microfacets of metal.
     Metal { conductor: Conductor, alpha: f32 },
-    /// Microfacets of glass; `eta` is the index on the viewer's side over that of the other.
-    Glass { eta: f32, alpha: f32 },
+    /// Microfacets of glass; `eta` is the index on the viewer's side over that of the other, `let_through` a factor on
+    /// what comes from there.
+    Glass { eta: f32, alpha: f32, let_through: Vec3 },
 }
 
 /// Directions to the viewer and to where the light comes from.
@@ -31,9 +32,9 @@ pub(super) struct Local {
 const LEAST_CONTRAST: f32 = 1e-3;
 
 impl Lobe {
-    pub(super) fn glass(eta: f32, alpha: f32) -> Self {
+    pub(super) fn glass(eta: f32, alpha: f32, let_through: Vec3) -> Self {
         let eta = if (eta - 1.0).abs() < LEAST_CONTRAST { 1.0 + LEAST_CONTRAST } else { eta };
-        Self::Glass { eta, alpha }
+        Self::Glass { eta, alpha, let_through }
     }
 
     /// About how much of the light it scatters.
@@ -74,7 +75,10 @@ impl Lobe {
                 metal_reflectance(wo.dot(h), conductor)
                     * (ggx.density(h) * ggx.both_seen(wo, wi) / (4.0 * wo.z))
             }
-            Self::Glass { eta, alpha } => Vec3::splat(glass(*eta, Ggx { alpha: *alpha }, local).value),
+            Self::Glass { eta, alpha, let_through } => {
+                let factor = if wi.z < 0.0 { *let_through } else { Vec3::ONE };
+                factor * glass(*eta, Ggx { alpha: *alpha }, local).value
+            }
         }
     }
 
@@ -97,7 +101,7 @@ impl Lobe {
                     Some(_) | None => 0.0,
                 }
             }
-            Self::Glass { eta, alpha } => glass(*eta, Ggx { alpha: *alpha }, local).pdf,
+            Self::Glass { eta, alpha, .. } => glass(*eta, Ggx { alpha: *alpha }, local).pdf,
         }
     }
 
@@ -119,7 +123,7 @@ impl Lobe {
                 let wi = reflect(-wo, h);
                 (wi.z > 0.0).then_some(wi)
             }
-            Self::Glass { eta, alpha } => {
+            Self::Glass { eta, alpha, .. } => {
                 let h = Ggx { alpha: *alpha }.sample_visible(wo, u);
                 let reflectance = fresnel(wo.dot(h), *eta);
                 let wi = if choice < reflectance { reflect(-wo, h) } else { refract(-wo, h, *eta)? };

@@ -25,7 +25,8 @@ impl LayerSums {
 
     pub(super) fn to_array(self) -> [f32; 18] {
         let [a, b] = self.indirect;
-        let parts = [self.sampled, self.bounced, self.looked_up, self.irradiance, a, b].map(|part| part.to_array());
+        let parts =
+            [self.sampled, self.bounced, self.looked_up, self.irradiance, a, b].map(|part| part.to_array());
         std::array::from_fn(|i| parts[i / 3][i % 3])
     }
 
@@ -99,7 +100,11 @@ impl Film {
     #[must_use]
     pub fn layer_indirect(&self, index: usize) -> Vec<Vec3> {
         let each = self.layers.len() / self.pixels.len().max(1);
-        self.layers.chunks_exact(each).zip(&self.pixels).map(|(sums, pixel)| sums[index].indirect_mean(pixel)).collect()
+        self.layers
+            .chunks_exact(each)
+            .zip(&self.pixels)
+            .map(|(sums, pixel)| sums[index].indirect_mean(pixel))
+            .collect()
     }
 
     /// The part of a named layer in the irradiance of the pixels' footprints by photons, mean of the halves.

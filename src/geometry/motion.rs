@@ -1,6 +1,6 @@
 //! Where a moving object is at any moment while the shutter is open.
 
-use super::HullPoint;
+use super::{Bounds, HullPoint};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 /// How an object moves while the shutter is open, from time 0 to time 1.
@@ -50,11 +50,38 @@ impl Motion {
 
     /// From its frame, in which it is where the scene file says, to the world.
     #[inline]
-    pub(super) fn pose(&self, time: f32) -> DAffine3 {
+    #[must_use]
+    pub fn pose(&self, time: f32) -> DAffine3 {
         let shift = self.shift(time);
         let Some(turn) = &self.turn else { return DAffine3::from_translation(shift) };
         let matrix = turn.matrix(f64::from(time));
         DAffine3 { matrix3: matrix, translation: turn.about + shift - matrix * turn.about }
+    }
+
+    /// The scale at a time if it is the same along all axes.
+    #[must_use]
+    pub fn even_scale(&self, time: f32) -> Option<f64> {
+        let Some(turn) = &self.turn else { return Some(1.0) };
+        let even = turn.scale.x == turn.scale.y && turn.scale.y == turn.scale.z;
+        even.then(|| 1.0 + (turn.scale.x - 1.0) * f64::from(time))
+    }
+
+    /// The largest scale along any axis at any time.
+    #[must_use]
+    pub fn largest_scale(&self) -> f32 {
+        self.turn.map_or(1.0, |turn| turn.scale.max_element().max(1.0) as f32)
+    }
+
+    /// A box that holds a box of its frame at all times.
+    #[must_use]
+    pub fn swept_box(&self, local: Bounds) -> Bounds {
+        if local.is_empty() {
+            return Bounds::EMPTY;
+        }
+        let spheres = self.swept(local.corners().iter().map(super::point));
+        spheres.iter().fold(Bounds::EMPTY, |all, sphere| {
+            all.union(Bounds::new(sphere.position - sphere.radius, sphere.position + sphere.radius))
+        })
     }
 
     /// Spheres whose convex hull holds some spheres of its frame at all times.
@@ -76,7 +103,7 @@ impl Motion {
         // the piece's middle.
         let speed = self.translate.length() + turn.speed(reach);
         let stray = (0.5 * speed / f64::from(pieces)) as f32;
-        let radius = radius * turn.scale.max_element().max(1.0) as f32 + stray * (1.0 + 4.0 * f32::EPSILON);
+        let radius = radius * self.largest_scale() + stray * (1.0 + 4.0 * f32::EPSILON);
         let middle = |piece: u32| (f64::from(piece) + 0.5) / f64::from(pieces);
         let at = |piece| self.pose(middle(piece) as f32).transform_point3(position).as_vec3();
         (0..pieces).map(|piece| HullPoint { position: at(piece), radius }).collect()

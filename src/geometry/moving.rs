@@ -120,14 +120,9 @@ pub(super) fn swept_bounds(local: Bounds, motion: &Motion) -> Bounds {
     if local.is_empty() {
         return Bounds::EMPTY;
     }
-    let corners = local.corners();
-    let spheres = motion.swept(corners.iter().map(super::point));
-    let world = spheres.iter().fold(Bounds::EMPTY, |all, sphere| {
-        all.union(Bounds::new(sphere.position - sphere.radius, sphere.position + sphere.radius))
-    });
+    let world = motion.swept_box(local);
     // Rays are rounded in a frame whose origin may be far away.
     let far = local.min.abs().max(local.max.abs()).max_element();
-    let stretch = motion.turn.map_or(1.0, |turn| turn.scale.max_element().max(1.0) as f32);
-    let pad = 8.0 * f32::EPSILON * far * stretch;
+    let pad = 8.0 * f32::EPSILON * far * motion.largest_scale();
     Bounds::new(world.min - pad, world.max + pad).padded()
 }

@@ -38,10 +38,10 @@ impl Import {
             None => "default".to_owned(),
         });
         let name = self.unique(&wanted);
-        let specular = described["type"] != "diffuse";
+        let lets_through = described["type"] == "glass";
         let mut emission = self.emission(model, &material);
-        if specular && emission.take().is_some() {
-            self.warn("emission_ignored", format!("`{name}` is glass or metal, which cannot emit"));
+        if lets_through && emission.take().is_some() {
+            self.warn("emission_ignored", format!("`{name}` is glass, which cannot emit"));
         }
         let uv_set =
             material.pbr_metallic_roughness().base_color_texture().map_or(0, |info| info.tex_coord());
@@ -72,9 +72,6 @@ impl Import {
             let mut glass = self.glass(material);
             if roughness > 0.0 {
                 glass["roughness"] = short(roughness);
-                if glass.as_object_mut().is_some_and(|fields| fields.remove("abbe").is_some()) {
-                    self.warn("dispersion_ignored", "rough glass does not disperse light here");
-                }
             }
             return glass;
         }

@@ -3,8 +3,8 @@
 use super::window::{Region, Source, Window};
 use crate::geometry::{Ray, offset_origin};
 use crate::sampling::{SamplePoint, concentric_disc, cone_direction, cosine_hemisphere, uniform_sphere};
-use crate::scene::{DiskLight, Environment, Light, LightPoint, QuadLight, Scene, SphereLight, SpotLight};
-use glam::{DVec3, Vec2, Vec3};
+use crate::scene::{Environment, Light, LightPoint, QuadLight, Scene, SphereLight, SpotLight};
+use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// Draws photons for one window.
@@ -66,10 +66,10 @@ impl<'a> Emission<'a> {
         self.window
     }
 
-    /// Draws a photon; `None` where the light gives nothing in the drawn direction.
+    /// Draws a photon that flies at a time; `None` where the light gives nothing in the drawn direction.
     #[must_use]
-    pub fn sample(&self, sample: SamplePoint) -> Option<EmittedPhoton> {
-        self.emit(self.aim(sample), sample.get_2d(2))
+    pub fn sample(&self, sample: SamplePoint, time: f32) -> Option<EmittedPhoton> {
+        self.emit(self.aim(sample), sample.get_2d(2), time)
     }
 
     /// The point of the window that a sample goes through.
@@ -84,7 +84,7 @@ impl<'a> Emission<'a> {
 
     /// The photon from a point of the unit square, which the light's surface or directions are mapped to, through
     /// a point of the window.
-    pub(super) fn emit(&self, aim: Aim, on_light: Vec2) -> Option<EmittedPhoton> {
+    pub(super) fn emit(&self, aim: Aim, on_light: Vec2, time: f32) -> Option<EmittedPhoton> {
         let Aim { through, density } = aim;
         let mut photon = match &self.source {
             Sampler::Environment(environment) => self.emit_from_environment(environment, through, on_light),
@@ -101,16 +101,17 @@ impl<'a> Emission<'a> {
                 self.emit_from_point(&Origin::on(&point, quad.radiance * quad.area()), through)
             }
             Sampler::Light(Light::Disk(disk)) => {
-                let point = point_on_disk(disk, on_light);
+                let point = disk.point(on_light);
                 self.emit_from_point(&Origin::on(&point, disk.radiance * disk.area()), through)
             }
             Sampler::Light(Light::Mesh(mesh)) => {
-                let point = mesh.sample(on_light)?;
-                self.emit_from_point(&Origin::on(&point, mesh.radiance * mesh.area()), through)
+                let (point, area) = mesh.sample(time, on_light)?;
+                self.emit_from_point(&Origin::on(&point, mesh.radiance * area), through)
             }
             Sampler::Light(Light::Sphere(sphere)) => self.emit_from_sphere(sphere, through, on_light),
         }?;
         photon.power /= density;
+        photon.ray.time = time;
         (photon.power.max_element() > 0.0).then_some(photon)
     }
 
@@ -163,8 +164,8 @@ impl<'a> Emission<'a> {
         let (center, radius) = (sphere.center.as_dvec3(), f64::from(sphere.radius));
         let Region::Rectangle { corner, u: across, v: up } = &self.window.region else {
             let normal = uniform_sphere(u);
-            let point = point_on_sphere(sphere, normal.as_dvec3());
-            let strength = sphere.radiance * (4.0 * PI * sphere.radius * sphere.radius);
+            let point = sphere.point(normal.as_dvec3());
+            let strength = sphere.radiance * sphere.area();
             return self.emit_from_point(&Origin::on(&point, strength), through);
         };
         let target = (*corner + *across * through.x + *up * through.y).as_dvec3();
@@ -179,7 +180,7 @@ impl<'a> Emission<'a> {
         let along = to.dot(backward);
         let off = to - backward * along;
         let chord = (radius * radius - off.length_squared()).max(0.0).sqrt();
-        let point = point_on_sphere(sphere, (-off - backward * chord) / radius);
+        let point = sphere.point((-off - backward * chord) / radius);
         let direction = -backward.as_vec3();
         let area = across.cross(*up).dot(direction).abs();
         let origin = offset_origin(point.point, point.error, point.normal, point.normal);
@@ -229,17 +230,4 @@ fn point_on_quad(quad: &QuadLight, u: Vec2) -> LightPoint {
     let point = quad.center + quad.half_u * p.x + quad.half_v * p.y;
     let error = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element() * f32::EPSILON;
     LightPoint { point, normal: quad.normal, error: 2.0 * error }
-}
-
-fn point_on_disk(disk: &DiskLight, u: Vec2) -> LightPoint {
-    let (x, y) = disk.normal.any_orthonormal_pair();
-    let p = concentric_disc(u) * disk.radius;
-    let error = (disk.center.abs().max_element() + disk.radius) * (4.0 * f32::EPSILON);
-    LightPoint { point: disk.center + x * p.x + y * p.y, normal: disk.normal, error }
-}
-
-fn point_on_sphere(sphere: &SphereLight, normal: DVec3) -> LightPoint {
-    let point = (sphere.center.as_dvec3() + normal * f64::from(sphere.radius)).as_vec3();
-    let error = point.abs().max(sphere.center.abs()).max_element() * f32::EPSILON;
-    LightPoint { point, normal: normal.as_vec3(), error }
 }

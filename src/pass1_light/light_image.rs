@@ -187,9 +187,8 @@ impl ImageTracer<'_> {
     /// One random point of a part of the light stands for all of it.
     fn plain(&self, shot: &Shot, part: Part, (tally, spread): (&mut Tally, &mut Spread)) {
         let u = shot.sample.get_2d(2);
-        let Some(mut photon) = self.emission.emit(shot.aim, part.at(u.x, u.y)) else { return };
+        let Some(mut photon) = self.emission.emit(shot.aim, part.at(u.x, u.y), shot.time) else { return };
         photon.power *= shot.share * part.side * part.side;
-        photon.ray.time = shot.time;
         self.walk.trace(photon, shot.sample, tally, |step| match step {
             Step::Rests(photon) => spread.points.push(photon),
             Step::Meets(..) => {}
@@ -197,9 +196,8 @@ impl ImageTracer<'_> {
     }
 
     fn node(&self, shot: &Shot, at: Vec2, tally: &mut Tally) -> Node {
-        let Some(mut photon) = self.emission.emit(shot.aim, at) else { return Node::Dark };
+        let Some(mut photon) = self.emission.emit(shot.aim, at, shot.time) else { return Node::Dark };
         photon.power *= shot.share;
-        photon.ray.time = shot.time;
         let mut node = Node::Dark;
         let mut way = 0;
         self.walk.trace(photon, shot.sample, tally, |step| match step {

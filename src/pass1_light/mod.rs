@@ -294,9 +294,8 @@ fn trace_batch(
     for i in points {
         let sample = SamplePoint::new(block.seed, block.first.wrapping_add(i));
         tally.sent += 1;
-        let Some(mut photon) = emission.sample(sample) else { continue };
+        let Some(mut photon) = emission.sample(sample, time) else { continue };
         photon.power *= share;
-        photon.ray.time = time;
         tally.energy.emitted += photon.power.as_dvec3();
         walk.trace(photon, sample, &mut tally, |step| match step {
             Step::Rests(photon) => photons.push(photon),
@@ -365,10 +364,10 @@ pub fn pilot(scene: &Scene, window: &Window, block: Block) -> (Tally, Option<Gui
     for i in 0..block.count {
         let sample = SamplePoint::new(block.seed, block.first.wrapping_add(i));
         tally.sent += 1;
-        let Some(mut photon) = emission.sample(sample) else { continue };
-        photon.power /= block.count as f32;
         // A table serves all rounds: it is learned over the whole time that the shutter is open.
-        photon.ray.time = sample.get(TIME_DIMENSION);
+        let time = sample.get(TIME_DIMENSION);
+        let Some(mut photon) = emission.sample(sample, time) else { continue };
+        photon.power /= block.count as f32;
         tally.energy.emitted += photon.power.as_dvec3();
         let mut power = 0.0;
         walk.trace(photon, sample, &mut tally, |step| match step {

@@ -133,7 +133,7 @@ fn region(light: &Light, geometry: &Geometry, caster: ObjectId, hull: &[HullPoin
         Light::Quad(quad) => seen_from(&quad.corners(), center, hull),
         Light::Disk(disk) => seen_from(&disk.square().corners(), center, hull),
         Light::Sphere(sphere) => seen_from(&cube_around(sphere, center), center, hull),
-        Light::Mesh(mesh) => seen_from(&Bounds::of(mesh.corners()).corners(), center, hull),
+        Light::Mesh(mesh) => seen_from(&mesh.bounds().corners(), center, hull),
         Light::Spot(spot) => {
             let region = seen_from(&[spot.position], center, hull);
             let cone = 2.0 * std::f32::consts::PI * (1.0 - spot.cos_outer);

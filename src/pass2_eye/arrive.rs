@@ -4,6 +4,7 @@
 use super::direct::{Receiver, asked_times, density_toward, direct_light, power_heuristic};
 use super::footprint::view_code;
 use super::specular::{Branch, EyeWalk, Lookups, Scattered};
+use super::walls::Walls;
 use crate::bsdf::Bsdf;
 use crate::film::PixelSums;
 use crate::light_path::{Bounce, Kind, PICTURE, PathClass};
@@ -12,8 +13,9 @@ use crate::pass1_light::{RoundPhotons, Source};
 use crate::photon_map::{Incoming, Lookup, Nearest};
 use crate::plan::Asking;
 use crate::radius::{PIXEL, Reach};
-use crate::sampling::hash;
+use crate::sampling::{WAVELENGTH_DIMENSION, hash};
 use crate::scene::LightPoint;
+use crate::spectrum;
 use glam::Vec3;
 use std::f32::consts::PI;
 
@@ -32,6 +34,9 @@ const AFTER_DIFFUSE: u64 = 0x5eed_0d1f;
 /// is blurred once more by the first.
 const INDIRECT_WIDTH: f32 = 8.0;
 
+/// In a crease of which hardly anything is seen a density would be noise alone.
+const LEAST_MASS: f32 = 0.25;
+
 /// Paths of fewer D do not play roulette.
 const ROULETTE_AFTER: u32 = 2;
 
@@ -42,7 +47,8 @@ impl EyeWalk<'_> {
     /// Adds up what a surface shows; true if it has a D part.
     pub(super) fn arrive(&mut self, branch: &Branch, arrival: &Arrival<'_>, sums: &mut PixelSums) -> bool {
         self.see_emitter(branch, arrival, sums);
-        let Some(bsdf) = Bsdf::new(arrival) else { return false };
+        let line = || spectrum::pick(self.sample.branch(branch.key).get(WAVELENGTH_DIMENSION));
+        let Some(bsdf) = Bsdf::new(arrival, line) else { return false };
         let seen = branch.scattered.map_or(0, |s| s.count) + 1;
         if seen > 1 && !self.wants_more(branch) {
             // The paths asked for end at the last D.
@@ -113,7 +119,7 @@ impl EyeWalk<'_> {
                 let at = LightPoint { point: surface.point, normal: surface.normal, error: surface.error };
                 let tree = self.context.plan.light_tree.as_ref();
                 let times = asked_times(tree, &Asking { point, normal: None }, id);
-                let other = density_toward(light, point, &at).unwrap_or(0.0) * times;
+                let other = density_toward(light, (point, branch.ray.time), &at).unwrap_or(0.0) * times;
                 (PathClass::with_light_after(count), power_heuristic(pdf, other))
             }
             // Light over mirrors or glass: the photons' part, unless rays are to find it.
@@ -192,6 +198,7 @@ impl EyeWalk<'_> {
         let per_irradiance = |incoming: Incoming| {
             if pick(incoming.kind) { bsdf.per_irradiance(incoming.direction) } else { Vec3::ZERO }
         };
+        let geometry = &self.context.scene.geometry;
         let maps = if wider > 1.0 { photons.thinned.as_ref() } else { None };
         let map = &maps.unwrap_or(&photons.maps)[self.half];
         self.counts.lookups += 1;
@@ -202,8 +209,16 @@ impl EyeWalk<'_> {
                 if radiance == Vec3::ZERO {
                     return radiance;
                 }
-                let geometry = &self.context.scene.geometry;
-                radiance / geometry.kernel_mass(hit.sheet, point, radius, branch.ray.time)
+                let time = branch.ray.time;
+                let mass = geometry.kernel_mass(hit.sheet, point, radius, time);
+                let at = (&hit.surface, bsdf.geometric);
+                let walls = || Walls::around(geometry, at, radius, time);
+                let Some(walls) = self.border.then(walls).flatten() else { return radiance / mass };
+                let seen = |incoming: Incoming| {
+                    if walls.reach(incoming.offset) { per_irradiance(incoming) } else { Vec3::ZERO }
+                };
+                // Where a surface ends at a wall both say so.
+                map.radiance(&within(radius), seen) / mass.min(walls.mass(radius)).max(LEAST_MASS)
             }
             Reach::Disc(radius) => map.disc_radiance(&within(radius), per_irradiance),
             Reach::Nearest { count, most } => {
@@ -265,11 +280,18 @@ impl EyeWalk<'_> {
             ray: branch.ray.continue_from(origin, direction),
             throughput,
             media: *bsdf.media_toward(direction),
+            wavelength: branch.wavelength.or(scattered.wavelength),
             bounces: branch.bounces + 1,
             travelled: branch.travelled + arrival.hit.t,
             key: hash(branch.key, AFTER_DIFFUSE),
             main: false,
-            scattered: Some(Scattered { count: seen, point: surface.point, pdf, straight: true, to_footprint }),
+            scattered: Some(Scattered {
+                count: seen,
+                point: surface.point,
+                pdf,
+                straight: true,
+                to_footprint,
+            }),
             ..*branch
         });
     }

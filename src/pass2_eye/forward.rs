@@ -10,8 +10,9 @@ use crate::pass1_light::RoundLists;
 use crate::photon_map::Photon;
 use crate::plan::Plan;
 use crate::render::{Control, RenderError};
-use crate::sampling::{SamplePoint, hash};
+use crate::sampling::{SamplePoint, WAVELENGTH_DIMENSION, hash};
 use crate::scene::Scene;
+use crate::spectrum;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -124,7 +125,8 @@ impl Eye<'_> {
             return None;
         }
         let arrival = Arrival::new(scene, &ray, &hit, self.plan.eye_media, None);
-        let value = Bsdf::new(&arrival)?.per_irradiance_from(-photon.direction);
+        let line = || spectrum::pick(SamplePoint::new(self.seed, index).get(WAVELENGTH_DIMENSION));
+        let value = Bsdf::new(&arrival, line)?.per_irradiance_from(-photon.direction);
         let left = transmittance(arrival.media.absorption(scene), hit.t);
         let radiance = photon.power * value * left * (cosine * view.pixels_per_area);
         let pixel = view.raster.as_uvec2();

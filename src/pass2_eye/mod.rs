@@ -8,6 +8,7 @@ mod layers;
 mod outline;
 mod specular;
 mod spread;
+mod walls;
 
 pub use footprint::{Footprint, Footprints};
 pub use forward::{Connected, connect};
@@ -156,6 +157,7 @@ fn trace_pixel(
     let count = context.effort.samples(index).max(gathering).max(paths);
     let mut sums = PixelSums { samples: count, paths, ..PixelSums::default() };
     walk.counts.paths += 2 * u64::from(paths);
+    walk.border = gathers && context.footprints.at_border(index);
     walk.layers.clear();
     for half in 0..2 {
         if let (Some(footprint), Some(photons)) = (footprint, context.photons.filter(|_| gathers)) {

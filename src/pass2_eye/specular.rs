@@ -99,6 +99,8 @@ pub(super) struct EyeWalk<'a> {
     /// What the pixel gathers for its named layers.
     pub(super) layers: PixelLayers,
     pub(super) counts: EyeCounts,
+    /// Whether the pixel shows an edge of something: its look-ups may be at the foot of a wall.
+    pub(super) border: bool,
 }
 
 /// A ray on its way from the eye.
@@ -156,6 +158,7 @@ impl<'a> EyeWalk<'a> {
             goes_on: false,
             layers: PixelLayers::new(context.plan.layer_names.len()),
             counts: EyeCounts::default(),
+            border: false,
         }
     }
 

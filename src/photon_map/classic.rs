@@ -29,7 +29,7 @@ impl PhotonMap {
     #[must_use]
     pub fn disc_radiance(&self, lookup: &Lookup, per_irradiance: impl Fn(Incoming) -> Vec3) -> Vec3 {
         let mut sum = Vec3::ZERO;
-        self.visit(lookup, lookup.radius, |_, photon| sum += photon.seen(&per_irradiance));
+        self.visit(lookup, lookup.radius, |_, _, photon| sum += photon.seen(&per_irradiance));
         per_disc(sum, lookup.radius * lookup.radius)
     }
 
@@ -49,7 +49,7 @@ impl PhotonMap {
         let mut within = least.min(lookup.radius);
         loop {
             photons.clear();
-            self.visit(lookup, within, |distance2, photon| photons.push((distance2, photon)));
+            self.visit(lookup, within, |distance2, _, photon| photons.push((distance2, photon)));
             // Written so that a radius that is not a number ends it too.
             if photons.len() >= count || !(within > 0.0 && within < lookup.radius) {
                 break;
@@ -72,7 +72,7 @@ impl PhotonMap {
 impl Stored {
     /// What the viewer sees of it, times area.
     fn seen(&self, per_irradiance: &impl Fn(Incoming) -> Vec3) -> Vec3 {
-        Vec3::from_array(self.power) * per_irradiance(self.incoming())
+        Vec3::from_array(self.power) * per_irradiance(self.incoming(Vec3::ZERO))
     }
 }
 

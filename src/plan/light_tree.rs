@@ -235,10 +235,9 @@ impl Item {
             }
             Light::Sphere(sphere) => {
                 let corners = [sphere.center - sphere.radius, sphere.center + sphere.radius];
-                let area = 4.0 * PI * sphere.radius * sphere.radius;
-                (Bounds::of(corners), all(sphere.radiance, area), Cone::ALL)
+                (Bounds::of(corners), all(sphere.radiance, sphere.area()), Cone::ALL)
             }
-            Light::Mesh(mesh) => (Bounds::of(mesh.corners()), all(mesh.radiance, mesh.area()), Cone::ALL),
+            Light::Mesh(mesh) => (mesh.bounds(), all(mesh.radiance, mesh.area()), Cone::ALL),
         };
         Some(Self { light, bounds, power, cone })
     }
@@ -277,10 +276,10 @@ mod tests {
         Scene::from_json(&scene, &NoAssets).unwrap_or_else(|e| panic!("{e}"))
     }
 
-    /// Picks are as frequent as is said, the probabilities of all lights add up to at most 1, and no light that gives
+    /// T20: picks are as frequent as is said, the probabilities of all lights add up to at most 1, and no light that gives
     /// light is ruled out.
     #[test]
-    fn lights_are_picked_as_often_as_is_said() {
+    fn t20_lights_are_picked_as_often_as_is_said() {
         const PICKS: u32 = 4096;
         let scene = lights();
         let tree = LightTree::new(&scene);

@@ -143,7 +143,8 @@ record! {
         /// Name of its material.
         material: String = required(reference()),
         /// Radiance of its front: the outside of a sphere, the side of a polygon or mesh from which
-        /// its vertices run anticlockwise. Makes the object a light; it still reflects by its material.
+        /// its vertices run anticlockwise. Makes the object a light, also one that moves; it still reflects by its
+        /// material, which may not let light through.
         emission: Option<[f64; 3]> = optional(color("emission").unit("W·sr⁻¹·m⁻²")),
         /// The light group of its emission, as of a light.
         group: Option<String> = optional(group_name()),
@@ -181,7 +182,7 @@ record! {
         structure: Structure = or(choice(Structure::NAMED.to_vec()), Structure::Auto),
         /// How quad and disk lights are sampled: by one point per eye sample (`sobol`), or by the squares of a grid,
         /// at their centres (`grid`), at a random point of each (`jittered`), or at their corners, divided where those
-        /// disagree (`adaptive`).
+        /// disagree (`adaptive`, which misses what is smaller than a square and hides none of its corners).
         light_sampling: LightSampling = or(choice(LightSampling::NAMED.to_vec()), LightSampling::Sobol),
         /// Squares along each side of such a light, unless it is sampled by `sobol`.
         light_grid: u32 = or(count("squares along each side of a light", 1, 64), LIGHT_GRID),

@@ -1,6 +1,8 @@
 //! Lights. Emission for pass 1 is in `pass1_light::emit`, sampling for pass 2 in `pass2_eye::direct`.
 
-use glam::{DVec3, Vec3};
+use crate::geometry::{Bounds, Motion};
+use crate::sampling::{concentric_disc, uniform_sphere};
+use glam::{DMat3, DVec3, Vec3};
 use std::f64::consts::TAU;
 
 /// A source of light. Quantities are per channel.
@@ -28,7 +30,7 @@ pub enum Light {
     Disk(DiskLight),
     /// A sphere of constant radiance.
     Sphere(SphereLight),
-    /// Triangles of constant radiance: an object with an emission.
+    /// Triangles of constant radiance, and whatever moves: an object with an emission.
     Mesh(MeshLight),
 }
 
@@ -84,6 +86,15 @@ impl DiskLight {
         std::f32::consts::PI * self.radius * self.radius
     }
 
+    /// A point uniform over the disk.
+    #[must_use]
+    pub fn point(&self, u: glam::Vec2) -> LightPoint {
+        let (x, y) = self.normal.any_orthonormal_pair();
+        let p = concentric_disc(u) * self.radius;
+        let error = (self.center.abs().max_element() + self.radius) * (4.0 * f32::EPSILON);
+        LightPoint { point: self.center + x * p.x + y * p.y, normal: self.normal, error }
+    }
+
     /// The square around the disk, as a light of the same radiance.
     #[must_use]
     pub fn square(&self) -> QuadLight {
@@ -104,13 +115,31 @@ pub struct SphereLight {
     pub radiance: Vec3,
 }
 
-/// A surface of constant radiance that is made of triangles, each emitting to the side of its normal by the right-hand
-/// rule, or an open cylinder that emits outwards.
+impl SphereLight {
+    /// Area in m².
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        4.0 * std::f32::consts::PI * self.radius * self.radius
+    }
+
+    /// The point whose normal this is.
+    #[must_use]
+    pub fn point(&self, normal: DVec3) -> LightPoint {
+        let point = (self.center.as_dvec3() + normal * f64::from(self.radius)).as_vec3();
+        let error = point.abs().max(self.center.abs()).max_element() * f32::EPSILON;
+        LightPoint { point, normal: normal.as_vec3(), error }
+    }
+}
+
+/// A surface of constant radiance whose points are drawn by their area: triangles, each emitting to the side of its normal
+/// by the right-hand rule, or an open cylinder that emits outwards; of what moves, also a sphere or a disk.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshLight {
     /// Radiance, W·sr⁻¹·m⁻².
     pub radiance: Vec3,
     surface: Emitting,
+    /// How it moves while the shutter is open.
+    motion: Option<Motion>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -125,6 +154,8 @@ enum Emitting {
         to: DVec3,
         radius: f64,
     },
+    Sphere(SphereLight),
+    Disk(DiskLight),
 }
 
 /// A point of a light's surface.
@@ -152,27 +183,56 @@ impl MeshLight {
                 sums.push(sum);
             }
         }
-        Self { radiance, surface: Emitting::Triangles { triangles, sums } }
+        Self { radiance, surface: Emitting::Triangles { triangles, sums }, motion: None }
     }
 
     /// The side of a cylinder without its ends, between two points that differ.
     #[must_use]
     pub fn cylinder(radiance: Vec3, from: DVec3, to: DVec3, radius: f64) -> Self {
-        Self { radiance, surface: Emitting::Cylinder { from, to, radius } }
+        Self { radiance, surface: Emitting::Cylinder { from, to, radius }, motion: None }
     }
 
-    /// Area in m².
+    /// An object's light as one that moves.
+    #[must_use]
+    pub fn moving(light: Light, motion: Motion) -> Light {
+        let motion = Some(motion);
+        Light::Mesh(match light {
+            Light::Mesh(mesh) => Self { motion, ..mesh },
+            Light::Sphere(sphere) => {
+                Self { radiance: sphere.radiance, surface: Emitting::Sphere(sphere), motion }
+            }
+            Light::Disk(disk) => Self { radiance: disk.radiance, surface: Emitting::Disk(disk), motion },
+            // No object is one of these.
+            Light::Point { .. } | Light::Spot(_) | Light::Directional { .. } | Light::Quad(_) => {
+                return light;
+            }
+        })
+    }
+
+    /// Area in m²; of what moves and grows, the largest that it may have.
     #[must_use]
     pub fn area(&self) -> f32 {
+        let scale = self.motion.map_or(1.0, |motion| motion.largest_scale());
+        self.area_at_rest() * (scale * scale)
+    }
+
+    fn area_at_rest(&self) -> f32 {
         match &self.surface {
             Emitting::Triangles { sums, .. } => sums.last().copied().unwrap_or(0.0) as f32,
             Emitting::Cylinder { from, to, radius } => (TAU * radius * (*to - *from).length()) as f32,
+            Emitting::Sphere(sphere) => sphere.area(),
+            Emitting::Disk(disk) => disk.area(),
         }
     }
 
-    /// Points whose bounding box holds it.
+    /// A box that holds it at all times.
     #[must_use]
-    pub fn corners(&self) -> Vec<Vec3> {
+    pub fn bounds(&self) -> Bounds {
+        let rest = Bounds::of(self.corners_at_rest());
+        self.motion.map_or(rest, |motion| motion.swept_box(rest))
+    }
+
+    fn corners_at_rest(&self) -> Vec<Vec3> {
         match &self.surface {
             Emitting::Triangles { triangles, .. } => triangles.iter().flatten().copied().collect(),
             Emitting::Cylinder { from, to, radius } => [*from, *to]
@@ -180,12 +240,46 @@ impl MeshLight {
                 .flat_map(|end| [*end - *radius, *end + *radius])
                 .map(|p| p.as_vec3())
                 .collect(),
+            Emitting::Sphere(sphere) => [-sphere.radius, sphere.radius].map(|r| sphere.center + r).to_vec(),
+            Emitting::Disk(disk) => disk.square().corners().to_vec(),
         }
     }
 
-    /// A point uniform over the area for `u` uniform in the unit square; `None` if there is no area.
+    /// A point where it is at a time, uniform over the area at rest for `u` uniform in the unit square, and the area in m²
+    /// that it stands for: of a surface that is stretched, that of the whole if it were stretched everywhere as it is
+    /// there. `None` if there is no area.
     #[must_use]
-    pub fn sample(&self, u: glam::Vec2) -> Option<LightPoint> {
+    pub fn sample(&self, time: f32, u: glam::Vec2) -> Option<(LightPoint, f32)> {
+        let (rest, area) = (self.sample_at_rest(u)?, self.area_at_rest());
+        let Some(motion) = &self.motion else { return Some((rest, area)) };
+        let to_world = motion.pose(time);
+        let point = to_world.transform_point3(rest.point.as_dvec3()).as_vec3();
+        let turned = cofactors(&to_world.matrix3) * rest.normal.as_dvec3();
+        let stretch = turned.length();
+        let error = rest.error * motion.largest_scale() + point.abs().max_element() * (2.0 * f32::EPSILON);
+        Some((LightPoint { point, normal: (turned / stretch).as_vec3(), error }, area * stretch as f32))
+    }
+
+    /// The area that a point of the surface with this unit normal stands for at a time, as in [`MeshLight::sample`].
+    #[must_use]
+    pub fn area_at(&self, time: f32, normal: Vec3) -> f32 {
+        let Some(motion) = &self.motion else { return self.area_at_rest() };
+        let matrix = motion.pose(time).matrix3;
+        // The cofactors are the inverse transposed times the determinant.
+        let stretch = matrix.determinant() / (matrix.transpose() * normal.as_dvec3()).length();
+        self.area_at_rest() * stretch as f32
+    }
+
+    /// A sphere that moves, where it is at a time; `None` if it is no sphere there.
+    #[must_use]
+    pub fn as_sphere(&self, time: f32) -> Option<SphereLight> {
+        let (Emitting::Sphere(sphere), Some(motion)) = (&self.surface, &self.motion) else { return None };
+        let scale = motion.even_scale(time)?;
+        let center = motion.pose(time).transform_point3(sphere.center.as_dvec3()).as_vec3();
+        Some(SphereLight { center, radius: (f64::from(sphere.radius) * scale) as f32, ..sphere.clone() })
+    }
+
+    fn sample_at_rest(&self, u: glam::Vec2) -> Option<LightPoint> {
         match &self.surface {
             Emitting::Triangles { triangles, sums } => {
                 let target = f64::from(u.x) * sums.last()?;
@@ -208,8 +302,16 @@ impl MeshLight {
                 let error = (point.abs().max_element() + radius) as f32 * (4.0 * f32::EPSILON);
                 Some(LightPoint { point: point.as_vec3(), normal: normal.as_vec3(), error })
             }
+            Emitting::Sphere(sphere) => Some(sphere.point(uniform_sphere(u).as_dvec3())),
+            Emitting::Disk(disk) => Some(disk.point(u)),
         }
     }
+}
+
+/// What turns normals, and makes them as long as the area that a unit of area becomes.
+fn cofactors(matrix: &DMat3) -> DMat3 {
+    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = *matrix;
+    DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
 }
 
 /// Normal by the right-hand rule, as long as twice the area.

@@ -116,7 +116,8 @@ record! {
 }
 
 record! {
-    /// A planar polygon, convex or not.
+    /// A planar polygon, convex or not, by the even-odd rule: what lies within an even number of outlines is left out, as the
+    /// middle of a pentagram.
     PolygonFile {
         /// The outline, anticlockwise seen from the front.
         vertices: Vec<[f64; 3]> = required(list(3, point())),

@@ -279,12 +279,7 @@ fn shares(level: Level, mask: &[f32], size: (usize, usize)) -> Vec<Vec3> {
     share
 }
 
-fn filter_plane(
-    level: Level,
-    mut plane: Vec<Vec3>,
-    share: &[Vec3],
-    size: (usize, usize),
-) -> Vec<Vec3> {
+fn filter_plane(level: Level, mut plane: Vec<Vec3>, share: &[Vec3], size: (usize, usize)) -> Vec<Vec3> {
     level.boxes.iter().for_each(|&b| box_filter(&mut plane, b, size));
     for (value, share) in plane.iter_mut().zip(share) {
         *value = if share.x > 0.0 { *value / share.x } else { Vec3::ZERO };

@@ -1,7 +1,8 @@
 //! `LS+DE`: caustics whose light is known, from the photons alone.
 
 use crate::support::{
-    SEEDS, camera_above, compile, floor, mean, mean_irradiance, mean_over_square, over_seeds, render, scene,
+    SEEDS, T_LIMIT, camera_above, compile, floor, mean, mean_irradiance, mean_over_square, over_seeds,
+    render, scene,
 };
 use glam::DVec3;
 use nephroid::light_path::PathClass;
@@ -38,6 +39,44 @@ fn t12_a_slab_transmits_all_orders_of_internal_reflection() {
     estimate.assert_is(2.0 * 1.5 / (1.5 * 1.5 + 1.0), 0.0);
 }
 
+/// T12, F73: the same by the number of internal reflections, two at a time: with none, 0.9216; with up to one pair
+/// 0.92307456; with up to two 0.923076919. The error after k pairs is less than R^(2k + 2), by the paths asked for.
+#[test]
+fn t12_f73_each_pair_of_internal_reflections_adds_its_share() {
+    let face = |y: f64, z: f64| json!({ "type": "polygon", "material": "glass", "vertices": [[-1, y, z], [1, y, z], [1, y, -z], [-1, y, -z]] });
+    let objects = json!([floor(1.0, 0.0), face(1.2, 1.0), face(1.0, -1.0)]);
+    let mut slab = scene(camera_above([0.0; 3], 0.5, 0.4), objects, sun());
+    let r2 = 0.04_f64.powi(2);
+    let mut sum = 0.0;
+    for (pairs, known) in [(0_i32, 0.9216), (1, 0.923_074_56), (2, 0.923_076_919)] {
+        let specular = 2 + 2 * pairs;
+        sum += 0.96_f64.powi(2) * r2.powi(pairs);
+        assert!(
+            (sum - known).abs() < 1e-9 && (sum - 12.0 / 13.0).abs() < r2.powi(pairs + 1),
+            "{pairs}: {sum}"
+        );
+        // The share of this pair alone: of 0.0016 in all a sum would not show it.
+        slab["render"]["paths"] = json!(format!("LS{{{specular}}}DE"));
+        let share = over_seeds(|seed| mean_irradiance(&render(&slab, seed, 1, 18), PathClass::Caustic));
+        let known = 0.96_f64.powi(2) * r2.powi(pairs);
+        match pairs {
+            0 => share.assert_is(known, 0.0),
+            // One photon in 700: half of it or twice as much would show.
+            1 => {
+                let noise = T_LIMIT * share.standard_error;
+                assert!(noise < 0.25 * known && (share.mean - known).abs() < noise, "{share:?}, not {known}");
+            }
+            // One in 400 000.
+            _ => assert!(share.mean < 1e-5, "{share:?}"),
+        }
+    }
+    // No photon has met one or three S only: there is no such way to the floor.
+    for odd in [1, 3] {
+        slab["render"]["paths"] = json!(format!("LS{{{odd}}}DE"));
+        assert_eq!(mean_irradiance(&render(&slab, 1, 1, 14), PathClass::Caustic), 0.0, "{odd}");
+    }
+}
+
 /// T24: a point light and a mirror of reflectance 0.9 in the plane x = 1: the floor sees the image of the
 /// light at (2, 1, 0).
 #[test]
@@ -59,6 +98,23 @@ fn t24_a_plane_mirror_lights_the_floor_like_the_lights_image() {
     let camera = camera_above([0.5, 0.0, 1.8], 3.0, width);
     let dark = scene(camera, json!([floor(2.0, 0.0), mirror]), lights);
     assert_eq!(mean_irradiance(&render(&dark, 1, 1, 17), PathClass::Caustic), 0.0);
+}
+
+/// T39, F49: a mirror without thickness, lit from behind, stands on a floor: none of the light that it throws there is seen
+/// on this side of it, in no pixel along its foot.
+#[test]
+fn t39_f49_no_light_leaks_under_a_thin_wall() {
+    let mirror = json!({ "type": "polygon", "material": "mirror", "vertices": [[0, 0, -1], [0, 0, 1], [0, 1, 1], [0, 1, -1]] });
+    let lights = json!([{ "type": "point", "position": [0.5, 1, 0.1], "intensity": [1, 1, 1] }]);
+    // It sees the foot of the wall from x < 0, at a slant to the pixels, and nothing beyond the wall's top.
+    let camera = json!({ "type": "perspective", "eye": [-2, 1.5, 0.3], "target": [0, 0.05, 0], "fov": 8 });
+    let value = scene(camera, json!([floor(2.0, 0.0), mirror]), lights);
+    let render = render(&value, 1, 4, 14);
+    assert!(render.layer(PathClass::Caustic).pixels.iter().all(|p| *p == [0.0; 3]));
+    // There is light to leak: beyond the wall the floor is bright.
+    let behind =
+        scene(camera_above([0.1, 0.0, 0.0], 1.0, 0.1), value["objects"].clone(), value["lights"].clone());
+    assert!(mean_irradiance(&crate::support::render(&behind, 1, 1, 14), PathClass::Caustic) > 0.1);
 }
 
 /// T25, F60: a ball of index 1 bends nothing, so that the floor is lit as if it were not there: photons bring

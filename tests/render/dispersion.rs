@@ -209,7 +209,6 @@ fn a_bubble_in_glass_is_air() {
 fn materials_that_contradict_themselves_are_refused() {
     for (material, pointer) in [
         (json!({ "type": "glass", "ior": 1.5, "abbe": 50, "cauchy": [0.004, 0] }), "/materials/m/cauchy"),
-        (json!({ "type": "glass", "ior": 1.5, "abbe": 50, "roughness": 0.2 }), "/materials/m/roughness"),
         (json!({ "type": "mix", "first": "glass", "second": "air", "amount": 0.5 }), "/materials/m/second"),
         (json!({ "type": "mix", "first": "m", "second": "floor", "amount": 0.5 }), "/materials/m/first"),
         (json!({ "type": "mix", "first": "floor", "second": "floo", "amount": 0.5 }), "/materials/m/second"),

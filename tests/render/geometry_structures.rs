@@ -116,6 +116,61 @@ fn f39_f41_all_structures_find_the_same_bits() {
     assert!((10_000..39_000).contains(&hits), "{hits}");
 }
 
+/// F39, F41: a million rays over things whose faces and corners lie on the cells of a grid: along all 26 axes and diagonals,
+/// with zeros of either sign, from points in the planes of faces and of cells, and at random. Each structure finds what
+/// testing every primitive finds.
+#[test]
+fn f39_f41_a_million_rays_through_planes_and_corners_of_cells() {
+    let block = |builder: &mut GeometryBuilder, object: u32, at: Vec3| {
+        let mut mesh = MeshData::default();
+        let corner = |i: u8| Vec3::new(f32::from(i & 1), f32::from(i >> 1 & 1), f32::from(i >> 2 & 1));
+        mesh.positions = (0..8).map(|i| at + corner(i)).collect();
+        for [a, b, c, d] in
+            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+        {
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+        builder.mesh(ObjectId(object), &mesh);
+    };
+    let geometries = all(|builder| {
+        // In a cube of 4³ a grid's cells have their planes where the blocks have theirs.
+        for (i, at) in
+            [[0, 0, 0], [3, 3, 3], [0, 2, 1], [1, 2, 1], [2, 0, 3], [3, 1, 0]].into_iter().enumerate()
+        {
+            block(builder, i as u32, Vec3::from_array(at.map(|x: u8| f32::from(x))));
+        }
+        builder.sphere(ObjectId(9), Vec3::new(2.5, 3.5, 0.5), 0.5);
+        let tile = [(1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0)].map(|(x, z)| Vec3::new(x, 1.0, z));
+        builder.polygon(ObjectId(10), &[tile.to_vec()]).expect("a square is a polygon");
+    });
+    let [list, rivals @ ..] = &geometries[..] else { unreachable!() };
+    let signed = |k: u32, zero: f32| [-1.0, zero, 1.0][k as usize % 3];
+    let mut hits = 0;
+    for i in 0..1_000_000_u32 {
+        let random = SamplePoint::new(12, i);
+        let place = Vec3::new(random.get(0), random.get(1), random.get(2)) * 6.0 - 1.0;
+        let zero = if i.is_multiple_of(2) { 0.0 } else { -0.0 };
+        let axis = Vec3::new(signed(i, zero), signed(i / 3, zero), signed(i / 9, zero));
+        let ray = match i / 27 % 4 {
+            // On corners of cells, in the middle of their sides, or anywhere in a plane.
+            0 if axis != Vec3::ZERO => Ray::new((place * 2.0).round() / 2.0, axis.normalize()),
+            1 if axis != Vec3::ZERO => {
+                Ray::new(Vec3::new(place.x, place.y.round(), place.z), axis.normalize())
+            }
+            2 => Ray::new(place, ((place * 7.3).fract() * 4.0).round() - place),
+            _ => Ray::new(place, uniform_sphere(random.get_2d(3))),
+        };
+        let Some(direction) = ray.direction.try_normalize() else { continue };
+        let ray = Ray { direction, ..ray };
+        let expected = list.closest_hit(&ray);
+        hits += u32::from(expected.is_some());
+        for rival in rivals {
+            assert_eq!(rival.closest_hit(&ray), expected, "{} {i}: {ray:?}", rival.structure());
+        }
+    }
+    assert!((200_000..900_000).contains(&hits), "{hits}");
+}
+
 /// F37: no, one and very many equal primitives.
 #[test]
 fn f37_empty_single_and_identical_primitives_do_no_harm() {

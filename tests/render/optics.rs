@@ -91,6 +91,34 @@ fn f18_equal_indices_reflect_nothing() {
     }
 }
 
+/// F17: toward the critical angle reflectance rises to 1 without a jump: 1 - R falls as the cosine of the refracted ray, the
+/// square root of what the cosine inside is beyond its critical value.
+#[test]
+fn f17_reflectance_rises_to_one_without_a_jump() {
+    let critical = (1.0 - 1.0 / 2.25_f64).sqrt();
+    let mut last = 0.0;
+    for step in (0..=40).rev() {
+        let beyond = 2.0_f64.powi(step - 43);
+        let r = fresnel((critical + beyond) as f32, 1.5);
+        // cosθt = n sqrt((cosθ)² - (cosθc)²), and 1 - R = 2 cosθt (1/(n cosθ) + n/cosθ) up to its square.
+        let cos_t = 1.5 * ((critical + beyond).powi(2) - critical * critical).sqrt();
+        let slope = 2.0 / critical * (1.0 / 1.5 + 1.5);
+        // An ulp of the cosine next to it is worth this much of its own.
+        let rounding = slope * 1.5 * (4.0 * f64::from(f32::EPSILON)).sqrt();
+        if cos_t < 0.05 {
+            let gap = f64::from(1.0 - r);
+            assert!(
+                (gap - slope * cos_t).abs() < 0.1 * slope * cos_t + rounding,
+                "{beyond}: {gap} {}",
+                slope * cos_t
+            );
+        }
+        assert!(r >= last, "{beyond}: {r} after {last}");
+        last = r;
+    }
+    assert_eq!(fresnel((critical - 1e-6) as f32, 1.5), 1.0);
+}
+
 /// F16, F17, F19: at and beyond the critical angle and at grazing incidence everything is finite.
 #[test]
 fn f16_f17_f19_grazing_and_critical_incidence_are_finite() {

@@ -56,6 +56,16 @@ fn f54_a_specular_object_that_no_light_reaches_is_given_up() {
     assert_eq!(codes(&plan), ["no_photon_hit_specular"]);
 }
 
+/// A mirror that shines, and nothing that lights it: there is nothing to warn of.
+#[test]
+fn a_mirror_that_shines_need_not_be_lit() {
+    let mut lamp = ball("mirror");
+    lamp["emission"] = json!([1, 1, 1]);
+    let plan = plan(json!([floor(2.0, 0.0), lamp]), json!([]));
+    assert!(plan.photons.is_empty() && !decision(&plan, "pass 1").runs);
+    assert_eq!(codes(&plan), Vec::<&str>::new());
+}
+
 /// F55: photons that leave the scene, and receivers that are all black.
 #[test]
 fn f55_photons_that_land_nowhere_are_given_up_with_a_warning() {

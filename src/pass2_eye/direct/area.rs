@@ -3,7 +3,7 @@
 use super::spherical_rectangle::SphericalRectangle;
 use super::{Incident, Receiver, short_of};
 use crate::geometry::offset_origin;
-use crate::sampling::{concentric_disc, cone_direction};
+use crate::sampling::cone_direction;
 use crate::scene::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight};
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
@@ -38,24 +38,19 @@ pub(super) fn from_disk(receiver: &Receiver<'_>, disk: &DiskLight, u: Vec2) -> O
         if point.distance_squared(disk.center) > disk.radius * disk.radius {
             return None;
         }
-        let target = disk_point(disk, point);
+        let target = LightPoint { point, ..disk.point(Vec2::ZERO) };
         return towards(receiver, &target, |_, _| Drawn::new(disk.radiance, 1.0 / rectangle.solid_angle));
     }
-    let (x, y) = disk.normal.any_orthonormal_pair();
-    let p = concentric_disc(u) * disk.radius;
-    let target = disk_point(disk, disk.center + x * p.x + y * p.y);
-    towards(receiver, &target, by_area(disk.radiance, disk.area()))
+    towards(receiver, &disk.point(u), by_area(disk.radiance, disk.area()))
 }
 
-/// A point of a disk light.
-pub(super) fn disk_point(disk: &DiskLight, point: Vec3) -> LightPoint {
-    let error = (disk.center.abs().max_element() + disk.radius) * (4.0 * f32::EPSILON);
-    LightPoint { point, normal: disk.normal, error }
-}
-
-/// Uniform in the area of all triangles.
+/// Uniform in the area of the whole surface; of a sphere that moves, in its solid angle.
 pub(super) fn from_mesh(receiver: &Receiver<'_>, mesh: &MeshLight, u: Vec2) -> Option<Incident> {
-    towards(receiver, &mesh.sample(u)?, by_area(mesh.radiance, mesh.area()))
+    if let Some(sphere) = mesh.as_sphere(receiver.time) {
+        return from_sphere(receiver, &sphere, u);
+    }
+    let (point, area) = mesh.sample(receiver.time, u)?;
+    towards(receiver, &point, by_area(mesh.radiance, area))
 }
 
 /// What a drawn direction is worth.
@@ -130,14 +125,23 @@ pub(super) fn from_sphere(receiver: &Receiver<'_>, sphere: &SphereLight, u: Vec2
     })
 }
 
-/// Density per solid angle with which the light is sampled from `from` in the direction of a point of its own surface;
+/// Density per solid angle with which the light is sampled from a point at a time in the direction of a point of its own surface;
 /// `None` for lights that no ray can meet.
-pub(in crate::pass2_eye) fn density_toward(light: &Light, from: Vec3, at: &LightPoint) -> Option<f32> {
+pub(in crate::pass2_eye) fn density_toward(
+    light: &Light,
+    (from, time): (Vec3, f32),
+    at: &LightPoint,
+) -> Option<f32> {
     let to = at.point - from;
     let distance2 = to.length_squared();
     let cosine = -at.normal.dot(to) / distance2.sqrt();
     let over_area = |area: f32| (cosine > 0.0).then(|| distance2 / (cosine * area));
     let over_rectangle = |quad: &QuadLight| Some(1.0 / SphericalRectangle::new(quad, from)?.solid_angle);
+    let over_cone = |sphere: &SphereLight| {
+        let sine2 = sphere.radius * sphere.radius / (sphere.center - from).length_squared();
+        let height = sine2 / (1.0 + (1.0 - sine2).max(0.0).sqrt());
+        (sine2 < 1.0).then(|| 1.0 / (2.0 * std::f32::consts::PI * height))
+    };
     match light {
         Light::Point { .. } | Light::Spot(_) | Light::Directional { .. } => None,
         Light::Quad(quad) => over_rectangle(quad),
@@ -145,12 +149,11 @@ pub(in crate::pass2_eye) fn density_toward(light: &Light, from: Vec3, at: &Light
             over_rectangle(&disk.square())
         }
         Light::Disk(disk) => over_area(disk.area()),
-        Light::Mesh(mesh) => over_area(mesh.area()),
-        Light::Sphere(sphere) => {
-            let sine2 = sphere.radius * sphere.radius / (sphere.center - from).length_squared();
-            let height = sine2 / (1.0 + (1.0 - sine2).max(0.0).sqrt());
-            (sine2 < 1.0).then(|| 1.0 / (2.0 * std::f32::consts::PI * height))
-        }
+        Light::Mesh(mesh) => match mesh.as_sphere(time) {
+            Some(sphere) => over_cone(&sphere),
+            None => over_area(mesh.area_at(time, at.normal)),
+        },
+        Light::Sphere(sphere) => over_cone(sphere),
     }
 }
 

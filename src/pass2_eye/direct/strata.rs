@@ -1,9 +1,9 @@
 //! Pass 2, `LD`: the classical ways to sample an area light with many shadow rays: a regular grid, jittered strata,
 //! and strata that are divided where their corners disagree. They are kept to be compared with the default.
 
-use super::area::{by_area, disk_point, towards};
+use super::area::{by_area, towards};
 use super::{Incident, Receiver};
-use crate::sampling::{SamplePoint, concentric_disc};
+use crate::sampling::SamplePoint;
 use crate::scene::{Light, LightPoint, LightSampling};
 use glam::{Vec2, Vec3};
 
@@ -71,12 +71,7 @@ impl Strata<'_> {
                 let point = LightPoint { point, normal: quad.normal, error: 4.0 * largest * f32::EPSILON };
                 towards(self.receiver, &point, by_area(quad.radiance, quad.area()))
             }
-            Light::Disk(disk) => {
-                let (x, y) = disk.normal.any_orthonormal_pair();
-                let p = concentric_disc(u) * disk.radius;
-                let point = disk_point(disk, disk.center + x * p.x + y * p.y);
-                towards(self.receiver, &point, by_area(disk.radiance, disk.area()))
-            }
+            Light::Disk(disk) => towards(self.receiver, &disk.point(u), by_area(disk.radiance, disk.area())),
             Light::Point { .. }
             | Light::Spot(_)
             | Light::Directional { .. }

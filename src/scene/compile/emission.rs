@@ -3,14 +3,21 @@
 use super::super::file::ObjectFile;
 use super::super::issue::IssueCode;
 use super::super::shape_file::{PolygonFile, ShapeFile};
-use super::super::{DiskLight, Light, LightId, Material, MeshLight, ObjectId, SphereLight};
+use super::super::{DiskLight, Light, LightId, MeshLight, ObjectId, SphereLight};
 use super::shape::{sides, transform};
 use super::{Compiler, vec3};
+use crate::geometry::Motion;
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 
 impl Compiler<'_> {
-    /// Makes an object a light if it has an emission. Its shape has been added before.
-    pub(super) fn emission(&mut self, id: ObjectId, object: &ObjectFile, index: usize) {
+    /// Makes an object a light if it has an emission. Its shape has been added before, moving or at rest.
+    pub(super) fn emission(
+        &mut self,
+        id: ObjectId,
+        object: &ObjectFile,
+        motion: Option<Motion>,
+        index: usize,
+    ) {
         let Some(radiance) = object.emission.map(vec3) else {
             if object.group.is_some() {
                 let message = "an object without `emission` is no light: it has no light group";
@@ -19,10 +26,9 @@ impl Compiler<'_> {
             return;
         };
         let material = self.objects[id.index()].material;
-        let specular = self.materials.get(material.index()).is_some_and(Material::has_specular);
-        if specular {
-            let message =
-                "what mirrors or lets light through cannot emit: give the object a diffuse material";
+        // Its light would have to begin on both sides at once.
+        if self.materials.get(material.index()).is_some_and(|material| material.dielectric().is_some()) {
+            let message = "what lets light through cannot emit: give the object an opaque material";
             self.issues.add(format!("/objects/{index}/emission"), IssueCode::ConflictingFields, message);
             return;
         }
@@ -30,6 +36,10 @@ impl Compiler<'_> {
             return;
         }
         let Some(light) = self.emitter(&object.shape, radiance, index) else { return };
+        let light = match motion {
+            Some(motion) => MeshLight::moving(light, motion),
+            None => light,
+        };
         self.objects[id.index()].emitter = Some(LightId(self.lights.len() as u32));
         self.light_places.push(format!("/objects/{index}/emission"));
         self.lights.push(light);

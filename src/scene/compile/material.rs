@@ -88,11 +88,6 @@ impl Compiler<'_> {
                 return None;
             }
         };
-        if ior.is_dispersive() && glass.roughness > 0.0 {
-            let message = "rough glass cannot disperse light: leave out `roughness`, or `abbe` and `cauchy`";
-            self.issues.add(material_field(name, "roughness"), IssueCode::ConflictingFields, message);
-            return None;
-        }
         let priority = i32::try_from(glass.priority).unwrap_or(i32::MAX);
         Some(Dielectric { ior, absorption: vec3(glass.absorption), priority })
     }

@@ -193,8 +193,8 @@ impl<'f> Compiler<'f> {
             let material = self.material_ids.get(object.material.as_str()).copied().unwrap_or(MaterialId(0));
             let name = object.name.clone().unwrap_or_else(|| format!("objects/{index}"));
             let id = self.add_object(Object { name, material, emitter: None });
-            self.place_object(id, object, index);
-            self.emission(id, object, index);
+            let motion = self.place_object(id, object, index);
+            self.emission(id, object, motion, index);
         }
     }
 

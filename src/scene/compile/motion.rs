@@ -23,28 +23,24 @@ impl Compiler<'_> {
         self.shutter = [open, close];
     }
 
-    /// Adds an object's shape, at rest or in motion.
-    pub(super) fn place_object(&mut self, id: ObjectId, object: &ObjectFile, index: usize) {
+    /// Adds an object's shape, at rest or in motion; tells how it moves.
+    pub(super) fn place_object(&mut self, id: ObjectId, object: &ObjectFile, index: usize) -> Option<Motion> {
         let moves = object.velocity != [0.0; 3] || object.motion.is_some();
-        if moves && object.emission.is_some() {
-            let message = "what emits cannot move yet: leave out its `velocity` and `motion`";
-            self.issues.add(format!("/objects/{index}/emission"), IssueCode::ConflictingFields, message);
-            return;
-        }
         let motion = self.motion(object);
         if motion.is_still() && motion.start == DVec3::ZERO {
             if moves && self.shutter[0] == self.shutter[1] {
                 let message = "it does not move: the camera's `shutter` is open for no time";
                 self.warn("shutter_closed", &format!("/objects/{index}"), message);
             }
-            return self.shape(id, &object.shape, index);
+            self.shape(id, &object.shape, index);
+            return None;
         }
         // The shape is put into a part of its own, by the same code as one at rest.
         let part = self.geometry.part();
         let whole = std::mem::replace(&mut self.geometry, part);
         self.shape(id, &object.shape, index);
         let part = std::mem::replace(&mut self.geometry, whole);
-        self.add_moving(id, object, part, motion, index);
+        Some(self.add_moving(id, object, part, motion, index))
     }
 
     fn add_moving(
@@ -54,7 +50,7 @@ impl Compiler<'_> {
         part: GeometryBuilder,
         mut motion: Motion,
         index: usize,
-    ) {
+    ) -> Motion {
         let about = object.motion.as_ref().and_then(|motion| motion.about);
         if let Some(turn) = &mut motion.turn {
             turn.about = about.map_or_else(|| own_middle(&object.shape, &part), DVec3::from);
@@ -68,6 +64,7 @@ impl Compiler<'_> {
             let message = format!("it would move farther than {MAX_LENGTH:e} m from the origin");
             self.issues.add(format!("/objects/{index}/{field}"), IssueCode::OutOfRange, message);
         }
+        motion
     }
 
     /// How an object moves; what it turns about is left to be filled in.
