@@ -70,12 +70,10 @@ impl<'a> Picture<'a> {
     /// A named layer, its part of what is smoothed as the whole is.
     fn named_layer(&self, index: usize) -> LinearImage {
         let Smoothing { photons, indirect } = &*self.smoothing;
-        let parts = [
-            (photons, Gathered::Photons, self.film.layer_irradiance(index)),
-            (indirect, Gathered::Indirect, self.film.layer_indirect(index)),
-        ];
-        parts.into_iter().fold(self.film.named_layer(index), |layer, (smoothed, gathered, part)| {
+        let parts = [(photons, Gathered::Photons), (indirect, Gathered::Indirect)];
+        parts.into_iter().fold(self.film.named_layer(index), |layer, (smoothed, gathered)| {
             let Some(smoothed) = smoothed else { return layer };
+            let part = self.film.layer_part(index, gathered, |pixel| self.footprints.get(pixel).is_some());
             add(layer, &smooth_part((self.film, self.footprints), (gathered, smoothed), &part))
         })
     }
@@ -125,8 +123,10 @@ impl<'a> Picture<'a> {
         let Smoothing { photons: caustics, indirect } = &*self.smoothing;
         let left = |smoothed: &Option<Smoothed>| smoothed.as_ref().and_then(|s| s.squared_error[index]);
         let bounced = left(indirect);
-        if let (Some(_), Some([a, b])) = (bounced, means.indirect) {
-            paths -= means.gain * 0.5 * (a - b);
+        let footprint = self.footprints.get(index).is_some();
+        if bounced.is_some() {
+            let [a, b] = means.indirect.unwrap_or_default();
+            paths = if footprint { paths - means.gain * 0.5 * (a - b) } else { Vec3::ZERO };
         }
         let mut photons = half(PathClass::Caustic);
         if self.film.caustics() == Caustics::Backward {
@@ -134,7 +134,8 @@ impl<'a> Picture<'a> {
         }
         let smoothed = left(caustics);
         if smoothed.is_some() {
-            photons -= means.gain * 0.5 * (means.irradiance[0] - means.irradiance[1]);
+            let [a, b] = means.irradiance;
+            photons = if footprint { photons - means.gain * 0.5 * (a - b) } else { Vec3::ZERO };
         }
         let darker = value - (sampled + paths + photons).abs();
         let photons = photons * photons + Vec3::splat(smoothed.unwrap_or(0.0));

@@ -9,13 +9,17 @@
 //! windows to small, a smaller window overruling only where it promises clearly less error.
 //!
 //! The main way of the eye through mirrors and glass is smoothed only; its fainter branches stay as they are. Within a
-//! pixel, irradiance and the surface's colour count as independent of each other.
+//! pixel, irradiance and the surface's colour count as independent of each other. Pixels without footprint, through a lens,
+//! on rough surfaces or where something moves, have their radiance filtered in the same way, among those whose middles show
+//! the same surface.
 
 mod ladder;
 mod segment;
 
 use crate::film::{Film, PixelMeans};
+use crate::light_path::PathClass;
 use crate::pass2_eye::Footprints;
+use crate::scene::Caustics;
 use glam::Vec3;
 use ladder::Ladder;
 use rayon::prelude::*;
@@ -42,12 +46,12 @@ pub struct Smoothed {
     level: Vec<u8>,
 }
 
-/// A kind of irradiance of the pixels' footprints.
+/// A kind of light that is smoothed: irradiance of the pixels' footprints, or radiance of pixels without one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gathered {
     /// By photons.
     Photons,
-    /// By paths that go on from there.
+    /// By paths that go on from the first D.
     Indirect,
 }
 
@@ -57,9 +61,9 @@ const LEAST_PIXELS: usize = 64;
 /// A pixel as smoothing sees it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sample {
-    /// Irradiance in each half.
+    /// Irradiance in each half, or radiance of a pixel without footprint.
     irradiance: [Vec3; 2],
-    /// Radiance per irradiance.
+    /// Radiance per irradiance, or 1.
     gain: Vec3,
     /// Radiance of everything else.
     rest: Vec3,
@@ -91,18 +95,23 @@ impl Smoothing {
     }
 }
 
-/// Which pixels show a piece of surface that is large enough to be smoothed.
+/// Which pixels' footprints are on a piece of surface that is large enough to be smoothed.
 #[must_use]
 pub fn smoothable(footprints: &Footprints) -> Vec<bool> {
     let mut smoothable = vec![false; footprints.size().0];
-    for segment in segment::segments(footprints).iter().filter(|s| s.pixels.len() >= LEAST_PIXELS) {
+    let segments = segment::segments(footprints).into_iter();
+    let with_footprints = |s: &Segment| footprints.get(s.pixels[0] as usize).is_some();
+    for segment in segments.filter(|s| s.pixels.len() >= LEAST_PIXELS && with_footprints(s)) {
         segment.pixels.iter().for_each(|&pixel| smoothable[pixel as usize] = true);
     }
     smoothable
 }
 
 fn smooth_one(film: &Film, footprints: &Footprints, gathered: Gathered) -> Option<Smoothed> {
-    let samples = samples(film, gathered);
+    if footprints.size().0 == 0 || (gathered == Gathered::Photons && film.caustics() != Caustics::Photons) {
+        return None;
+    }
+    let samples = samples((film, footprints), gathered);
     if samples.iter().all(|s| s.irradiance == [Vec3::ZERO; 2]) {
         return None;
     }
@@ -141,7 +150,7 @@ pub fn smooth_part(
     (gathered, smoothed): (Gathered, &Smoothed),
     irradiance: &[Vec3],
 ) -> Vec<Vec3> {
-    let samples = samples(film, gathered);
+    let samples = samples((film, footprints), gathered);
     let mut correction = vec![Vec3::ZERO; samples.len()];
     let segments: Vec<Segment> = lit_segments(footprints, &samples).collect();
     for segment in &segments {
@@ -163,17 +172,22 @@ fn lit_segments<'a>(
         .filter(|segment| segment.pixels.len() >= LEAST_PIXELS)
 }
 
-fn samples(film: &Film, gathered: Gathered) -> Vec<Sample> {
-    film.means().map(|means| Sample::of(&means, gathered)).collect()
+fn samples((film, footprints): (&Film, &Footprints), gathered: Gathered) -> Vec<Sample> {
+    let sample = |(i, means)| Sample::of(&means, (gathered, footprints.get(i).is_some()));
+    film.means().enumerate().map(sample).collect()
 }
 
 impl Sample {
-    fn of(means: &PixelMeans, gathered: Gathered) -> Self {
-        let (irradiance, known) = match gathered {
-            Gathered::Photons => (means.irradiance, true),
-            Gathered::Indirect => (means.indirect.unwrap_or_default(), means.indirect.is_some()),
+    fn of(means: &PixelMeans, (gathered, footprint): (Gathered, bool)) -> Self {
+        let radiance = |class| [0, 1].map(|half| means.halves[half].get(class));
+        let (irradiance, gain, known) = match (gathered, footprint) {
+            (Gathered::Photons, true) => (means.irradiance, means.gain, true),
+            (Gathered::Photons, false) => (radiance(PathClass::Caustic), Vec3::ONE, true),
+            (Gathered::Indirect, true) => {
+                (means.indirect.unwrap_or_default(), means.gain, means.indirect.is_some())
+            }
+            (Gathered::Indirect, false) => (radiance(PathClass::Indirect), Vec3::ONE, true),
         };
-        let gain = means.gain;
         let rest = means.total() - gain * 0.5 * (irradiance[0] + irradiance[1]);
         Self { irradiance, gain, rest: rest.max(Vec3::ZERO), known }
     }

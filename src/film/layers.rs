@@ -2,6 +2,7 @@
 
 use super::{Film, PixelSums, RoundFilm};
 use crate::image_io::LinearImage;
+use crate::smooth::Gathered;
 use glam::{DVec3, Vec3};
 
 /// What both halves of a pixel have gathered for one named layer; sums as in [`HalfSums`](super::HalfSums).
@@ -96,22 +97,26 @@ impl Film {
         LinearImage { width: self.width, height: self.height, pixels }
     }
 
-    /// The part of a named layer in the irradiance of the pixels' footprints by other D.
+    /// The part of a named layer in what is smoothed, mean of the halves: irradiance of the pixels that have a footprint,
+    /// radiance of the others.
     #[must_use]
-    pub fn layer_indirect(&self, index: usize) -> Vec<Vec3> {
-        let each = self.layers.len() / self.pixels.len().max(1);
-        self.layers
-            .chunks_exact(each)
-            .zip(&self.pixels)
-            .map(|(sums, pixel)| sums[index].indirect_mean(pixel))
-            .collect()
-    }
-
-    /// The part of a named layer in the irradiance of the pixels' footprints by photons, mean of the halves.
-    #[must_use]
-    pub fn layer_irradiance(&self, index: usize) -> Vec<Vec3> {
+    pub fn layer_part(
+        &self,
+        index: usize,
+        gathered: Gathered,
+        has_footprint: impl Fn(usize) -> bool,
+    ) -> Vec<Vec3> {
         let each = self.layers.len() / self.pixels.len().max(1);
         let per_photon = if self.photon_weight > 0.0 { 0.5 / self.photon_weight } else { 0.0 };
-        self.layers.chunks_exact(each).map(|sums| sums[index].irradiance * per_photon).collect()
+        let part = |(i, (layers, pixel)): (usize, (&[LayerSums], &PixelSums))| {
+            let sums = &layers[index];
+            match (gathered, has_footprint(i)) {
+                (Gathered::Photons, true) => sums.irradiance * per_photon,
+                (Gathered::Photons, false) => sums.looked_up * per_photon,
+                (Gathered::Indirect, true) => sums.indirect_mean(pixel),
+                (Gathered::Indirect, false) => sums.bounced * (0.5 / pixel.paths.max(1) as f32),
+            }
+        };
+        self.layers.chunks_exact(each).zip(&self.pixels).enumerate().map(part).collect()
     }
 }

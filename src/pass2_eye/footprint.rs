@@ -23,6 +23,19 @@ use rayon::prelude::*;
 pub struct Footprints {
     width: usize,
     pixels: Vec<Option<Footprint>>,
+    /// What the middles of the other pixels show; empty if all have footprints.
+    sights: Vec<Option<Sight>>,
+}
+
+/// What the middle of a pixel shows, at the end of the main way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sight {
+    /// Names the sheet and the way there.
+    pub view: u32,
+    /// Where it is.
+    pub point: Vec3,
+    /// Unit normal on the side that is seen.
+    pub normal: Vec3,
 }
 
 /// Where a pixel's corners land.
@@ -55,6 +68,8 @@ struct Landing {
     key: u64,
     only_way: bool,
     specular: u8,
+    /// Whether its irradiance tells what is seen, and it is the same for all colours and times.
+    certain: bool,
 }
 
 /// Names a sheet seen by certain reflections and refractions. A wall seen through water and the same wall above
@@ -75,14 +90,33 @@ const SAME_FACE: f32 = 0.95;
 const STRAIGHTNESS: f32 = 0.1;
 
 impl Footprints {
-    /// Traces the corners of all pixels. Through a lens no pixel has a footprint.
+    /// Traces the corners of all pixels, and the middles of those whose corners bound no footprint. Through a lens a pixel sees
+    /// more than lies between its corners: no pixel has a footprint.
     #[must_use]
     pub fn trace(scene: &Scene, eye_media: &Media) -> Self {
         let (width, height) = (scene.image.width as usize, scene.image.height as usize);
-        if scene.camera.lens().is_some() {
-            // Through a lens a pixel sees more than lies between its corners: photons are looked up instead.
-            return Self { width, pixels: vec![None; width * height] };
+        let pixels = if scene.camera.lens().is_some() {
+            vec![None; width * height]
+        } else {
+            Self::between_corners(scene, eye_media)
+        };
+        let mut footprints = Self { width, pixels, sights: Vec::new() };
+        if footprints.pixels.iter().any(Option::is_none) {
+            let sight = |i: usize| {
+                if footprints.pixels[i].is_some() || footprints.at_border(i) {
+                    return None;
+                }
+                let middle = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+                let Landing { point, normal, sheet, key, .. } = follow_main_way(scene, eye_media, middle)?;
+                Some(Sight { view: view_code(sheet, key), point, normal })
+            };
+            footprints.sights = (0..width * height).into_par_iter().map(sight).collect();
         }
+        footprints
+    }
+
+    fn between_corners(scene: &Scene, eye_media: &Media) -> Vec<Option<Footprint>> {
+        let (width, height) = (scene.image.width as usize, scene.image.height as usize);
         let corners: Vec<Vec<Option<Landing>>> = (0..=height)
             .into_par_iter()
             .map(|y| (0..=width).map(|x| land(scene, eye_media, Vec2::new(x as f32, y as f32))).collect())
@@ -99,7 +133,19 @@ impl Footprints {
                 (0..width).map(pixel).collect()
             })
             .collect();
-        Self { width, pixels: rows.concat() }
+        rows.concat()
+    }
+
+    /// What a pixel shows, if it is one thing: its footprint or, away from borders, what its middle shows.
+    #[must_use]
+    pub fn sight(&self, index: usize) -> Option<Sight> {
+        match self.get(index) {
+            Some(footprint) => {
+                let Footprint { view, normal, .. } = *footprint;
+                Some(Sight { view, point: footprint.center(), normal })
+            }
+            None => *self.sights.get(index)?,
+        }
     }
 
     /// A pixel's footprint.
@@ -134,7 +180,7 @@ impl Footprints {
     }
 
     /// Bytes per pixel.
-    pub const BYTES_PER_PIXEL: u64 = size_of::<Option<Footprint>>() as u64;
+    pub const BYTES_PER_PIXEL: u64 = (size_of::<Option<Footprint>>() + size_of::<Option<Sight>>()) as u64;
 }
 
 impl Footprint {
@@ -181,18 +227,21 @@ impl Footprint {
     }
 }
 
-/// Follows the main way from a raster position to the first D; `None` if that has highlights, where irradiance alone
-/// does not say what is seen, or if light is taken apart on the way.
+/// Where the main way from a raster position ends; `None` if that has highlights, where irradiance alone does not say what
+/// is seen, if light is taken apart on the way, or if something moves there.
 fn land(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
+    follow_main_way(scene, eye_media, raster).filter(|landing| landing.certain)
+}
+
+/// Follows the main way from a raster position to the first D.
+fn follow_main_way(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
     let mut ray = scene.camera.ray(raster);
     let mut media = *eye_media;
     let mut key = 1_u64;
-    let mut only_way = true;
+    let (mut only_way, mut certain) = (true, true);
     for specular in 0..MOST_BOUNCES {
         let hit = scene.geometry.closest_hit(&ray)?;
-        if scene.geometry.may_meet_moving(&ray, hit.t) {
-            return None;
-        }
+        certain &= !scene.geometry.may_meet_moving(&ray, hit.t);
         let arrival = Arrival::new(scene, &ray, &hit, media, None);
         let interaction = arrival.interact(|| UNDISPERSED);
         let material = arrival.material();
@@ -200,14 +249,13 @@ fn land(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
         if material.has_diffuse() {
             let normal = facing(surface, ray.direction);
             only_way &= interaction.reflected.is_none() && interaction.refracted.is_none();
-            let landing = Landing { point: surface.point, normal, sheet: hit.sheet, key, only_way, specular };
-            return material.is_lambertian().then_some(landing);
+            certain &= material.is_lambertian();
+            let (point, sheet) = (surface.point, hit.sheet);
+            return Some(Landing { point, normal, sheet, key, only_way, specular, certain });
         }
         only_way &= interaction.reflected.is_none() || interaction.refracted.is_none();
         let outcome = interaction.refracted.or(interaction.reflected)?;
-        if outcome.wavelength.is_some() {
-            return None;
-        }
+        certain &= outcome.wavelength.is_none();
         key = outcome.extend_key(key);
         media = outcome.media;
         let origin = arrival.origin_toward(outcome.direction);
@@ -216,7 +264,7 @@ fn land(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Landing> {
     None
 }
 
-/// Stands for the wavelength of light that is taken apart: such ways are not followed.
+/// Stands for the wavelength of light that is taken apart.
 const UNDISPERSED: Line = Line { wavelength: crate::scene::FRAUNHOFER[1], weight: Vec3::ONE };
 
 /// The geometric normal on the side that a ray comes from.

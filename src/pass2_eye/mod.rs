@@ -10,7 +10,7 @@ mod specular;
 mod spread;
 mod walls;
 
-pub use footprint::{Footprint, Footprints};
+pub use footprint::{Footprint, Footprints, Sight};
 pub use forward::{Connected, connect};
 pub use specular::EyeCounts;
 pub use spread::Irradiance;

@@ -1,6 +1,6 @@
 //! Segments: connected pixels whose eye rays reach one smooth piece of the same surface.
 
-use crate::pass2_eye::{Footprint, Footprints};
+use crate::pass2_eye::{Footprints, Sight};
 
 /// Connected pixels of one smooth surface, and the box around them.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,21 +56,24 @@ impl Segment {
 /// Neighbours whose normals differ by more than this are on different faces (cosine of 18°).
 const SAME_FACE: f32 = 0.95;
 
-/// All segments, in the order of their first pixels.
+/// All segments, in the order of their first pixels. Pixels with a footprint and those without are never in one: of the first
+/// it is irradiance that is filtered, of the others radiance.
 pub(super) fn segments(footprints: &Footprints) -> Vec<Segment> {
     let (count, width) = footprints.size();
+    let sights: Vec<Option<(bool, Sight)>> =
+        (0..count).map(|i| Some((footprints.get(i).is_some(), footprints.sight(i)?))).collect();
     let mut seen = vec![false; count];
     let mut segments = Vec::new();
     let mut queue = Vec::new();
     for start in 0..count {
-        if seen[start] || footprints.get(start).is_none() {
+        if seen[start] || sights[start].is_none() {
             continue;
         }
         seen[start] = true;
         queue.push(start);
         let mut members = Vec::new();
         while let Some(i) = queue.pop() {
-            let Some(here) = footprints.get(i) else { continue };
+            let Some(here) = &sights[i] else { continue };
             members.push(i as u32);
             let x = i % width;
             let left = (x > 0).then(|| i - 1);
@@ -78,7 +81,7 @@ pub(super) fn segments(footprints: &Footprints) -> Vec<Segment> {
             let above = i.checked_sub(width);
             let below = (i + width < count).then_some(i + width);
             for j in [left, right, above, below].into_iter().flatten() {
-                if !seen[j] && footprints.get(j).is_some_and(|there| joined(here, there)) {
+                if !seen[j] && sights[j].as_ref().is_some_and(|there| joined(here, there)) {
                     seen[j] = true;
                     queue.push(j);
                 }
@@ -91,11 +94,11 @@ pub(super) fn segments(footprints: &Footprints) -> Vec<Segment> {
 
 /// True if both pixels show the same smooth piece: same view, similar normals, and each in the other's
 /// tangent plane up to the slope that those normals allow.
-fn joined(a: &Footprint, b: &Footprint) -> bool {
-    if a.view != b.view || a.normal.dot(b.normal) < SAME_FACE {
+fn joined((a_footprint, a): &(bool, Sight), (b_footprint, b): &(bool, Sight)) -> bool {
+    if a_footprint != b_footprint || a.view != b.view || a.normal.dot(b.normal) < SAME_FACE {
         return false;
     }
-    let apart = b.center() - a.center();
+    let apart = b.point - a.point;
     let off = apart.dot(a.normal).abs().max(apart.dot(b.normal).abs());
     off <= 0.35 * apart.length()
 }
