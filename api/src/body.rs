@@ -7,7 +7,7 @@ use axum::http::{HeaderMap, header};
 use http_body_util::BodyExt;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit};
 
 /// What is still read and thrown away of a body that is too large. A client that is cut off while it
 /// sends sees a broken connection; one that may finish sees why it was refused.
@@ -22,22 +22,31 @@ const PIECE: usize = 64 << 10;
 /// As many bodies of the largest size may be in memory at once; more are refused, or one client could fill it with
 /// bodies that never end.
 const LARGEST_AT_ONCE: usize = 4;
+/// Assets that may be on their way at once. Each holds a thread that writes it.
+const UPLOADS_AT_ONCE: usize = 32;
 
-/// Memory for the bodies that are on their way.
+/// Room for what is on its way in.
 #[derive(Clone, Debug)]
 pub(crate) struct Room {
     limit: usize,
     pieces: Arc<Semaphore>,
+    uploads: Arc<Semaphore>,
 }
 
-/// The part of it that a body takes, until this is dropped.
+/// The memory that a body takes, until this is dropped.
 pub(crate) type Taken = Option<OwnedSemaphorePermit>;
 
 impl Room {
     /// For bodies of at most `limit` bytes.
     pub(crate) fn new(limit: usize) -> Self {
         let pieces = (limit / PIECE + 1).saturating_mul(LARGEST_AT_ONCE).min(Semaphore::MAX_PERMITS);
-        Self { limit, pieces: Arc::new(Semaphore::new(pieces)) }
+        let uploads = Arc::new(Semaphore::new(UPLOADS_AT_ONCE));
+        Self { limit, pieces: Arc::new(Semaphore::new(pieces)), uploads }
+    }
+
+    /// A place for an upload, until it is dropped.
+    pub(crate) fn for_upload(&self) -> Result<SemaphorePermit<'_>, Problem> {
+        self.uploads.try_acquire().map_err(|_| Problem::busy())
     }
 
     /// Takes what a body of so many bytes needs beyond what it has; false if there is not so much.

