@@ -261,6 +261,11 @@ impl Plan {
             self.photons.push(Budget { window: pilot.window, log2_block, carries });
         }
         self.decide_gathering(scene);
+        self.decide_photons(all);
+    }
+
+    /// Says in words what was found of so many pairs of light and specular object.
+    fn decide_photons(&mut self, all: usize) {
         let sent: u64 = self.photons.iter().map(|b| 2_u64 << b.log2_block).sum();
         let kept = self.photons.len();
         let images = self.photons.iter().filter(|b| b.carries == Carries::LightImages).count();
@@ -268,11 +273,18 @@ impl Plan {
         self.decide(
             "pass 1",
             true,
-            match images {
-                0 => format!("{sent} photons a round through {kept} windows"),
-                images => format!("{sent} photons a round through {kept} windows, {images} of them with images of the light"),
+            match (kept, images) {
+                (1, 0) => format!("{sent} photons a round through one window"),
+                (1, _) => format!("{sent} photons a round through one window, with images of the light"),
+                (_, 0) => format!("{sent} photons a round through {kept} windows"),
+                _ => format!("{sent} photons a round through {kept} windows, {images} of them with images of the light"),
             },
-            format!("{kept} of {all} pairs of light and specular object throw light onto a surface; each gets photons by the light it delivers, {guided} of them through a table of where they arrive from"),
+            match (all, guided) {
+                (1, 0) => "the light reaches the specular object, which throws it onto a surface".to_owned(),
+                (1, _) => "the light reaches the specular object, which throws it onto a surface; photons are sent by a table of where they arrive from".to_owned(),
+                (_, 0) => format!("{kept} of {all} pairs of light and specular object throw light onto a surface; each gets photons by the light it delivers"),
+                _ => format!("{kept} of {all} pairs of light and specular object throw light onto a surface; each gets photons by the light it delivers, {guided} of them through a table of where they arrive from"),
+            },
         );
     }
 

@@ -2,14 +2,14 @@
 //!
 //! Read in this order:
 //! - [`routes`]: every address on one screen; handlers convert, call and convert.
-//! - [`wire`] and [`problem`]: what goes out, [`body`]: what comes in; [`openapi`]: both, as a document.
+//! - [`wire`] and [`problem`]: what goes out, `body`: what comes in; [`openapi`]: both, as a document.
 //! - `access`: who is asking. `request`: what happens to every request. [`serve()`]: connections.
 //! - [`jobs`]: the database, the files and the thread that renders.
 //! - [`engine`]: the joint to the renderer; `error_map` and `chart`: its error as pictures. `metrics`: numbers.
 //! - [`samples`]: the embedded scenes. [`config`]: all settings.
 
 mod access;
-pub mod body;
+mod body;
 mod chart;
 pub mod config;
 pub mod engine;
@@ -29,6 +29,7 @@ pub use routes::router;
 pub use serve::serve;
 
 use access::Rates;
+use body::Room;
 use config::Settings;
 use jobs::service::{Jobs, OpenError};
 use metrics::Metrics;
@@ -42,6 +43,8 @@ pub struct AppState {
     pub(crate) planner: Planner,
     pub(crate) metrics: Arc<Metrics>,
     pub(crate) rates: Arc<Rates>,
+    /// For the scenes that are on their way in.
+    pub(crate) room: Room,
     pub(crate) settings: Arc<Settings>,
 }
 
@@ -55,6 +58,7 @@ impl AppState {
         let (settings, metrics) = (Arc::new(settings), Arc::<Metrics>::default());
         let jobs = Arc::new(Jobs::open(&settings, Arc::clone(&metrics))?);
         let planner = Planner::new(Arc::clone(&settings))?;
-        Ok(Self { jobs, planner, metrics, rates: Arc::new(Rates::new(&settings)), settings })
+        let (rates, room) = (Arc::new(Rates::new(&settings)), Room::new(settings.max_body));
+        Ok(Self { jobs, planner, metrics, rates, room, settings })
     }
 }

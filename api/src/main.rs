@@ -15,6 +15,9 @@ use tracing_subscriber::EnvFilter;
 /// The service must not be started like this.
 const REFUSED: u8 = 2;
 
+/// Threads that wait for the disk. More would only wait for each other, and take memory: the database has one reader.
+const BLOCKING_THREADS: usize = 128;
+
 /// How long the health check waits for the service.
 const PATIENCE: Duration = Duration::from_secs(3);
 
@@ -43,7 +46,10 @@ fn serve(settings: Settings) -> Result<ExitCode, Box<dyn Error>> {
     let listener = TcpListener::bind(settings.listen)
         .map_err(|error| format!("cannot listen on {}: {error}", settings.listen))?;
     listener.set_nonblocking(true)?;
-    let runtime = tokio::runtime::Runtime::new()?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .max_blocking_threads(BLOCKING_THREADS)
+        .build()?;
     // Before rendering starts, so that a signal from then on puts the jobs aside.
     let shutdown = runtime.block_on(async { stop_signal() })?;
     let state = AppState::open(settings)?;

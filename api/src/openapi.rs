@@ -141,7 +141,7 @@ fn describe(status: &str) -> &'static str {
         "415" => "The body is not declared as JSON",
         "422" => "The scene cannot be rendered, or asks for too much",
         "429" => "Too many requests or jobs",
-        "503" => "The service stops, or cannot use its database",
+        "503" => "The service stops, has no room just now, or cannot use its database",
         "507" => "The disk is full",
         _ => "The service failed; its log says how",
     }

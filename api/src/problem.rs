@@ -35,7 +35,12 @@ impl Problem {
         self
     }
 
-    fn retry_after(mut self, seconds: u32) -> Self {
+    #[cfg(test)]
+    pub(crate) fn code(&self) -> &'static str {
+        self.code
+    }
+
+    pub(crate) fn retry_after(mut self, seconds: u32) -> Self {
         self.retry_after_s = Some(seconds);
         self
     }
@@ -158,6 +163,14 @@ impl Problem {
     pub fn draining() -> Self {
         let detail = "The service is stopping and takes no new jobs.";
         Self::new(StatusCode::SERVICE_UNAVAILABLE, "draining", "The service is stopping", detail)
+            .retry_after(QUEUE_RETRY_S)
+    }
+
+    /// 503: too much is on its way in.
+    #[must_use]
+    pub fn busy() -> Self {
+        let detail = "Too much is being sent at once; try again soon.";
+        Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", "The service has no room for it now", detail)
             .retry_after(QUEUE_RETRY_S)
     }
 

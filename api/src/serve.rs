@@ -7,6 +7,7 @@ use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use std::future::Future;
 use std::io;
 use std::net::SocketAddr;
@@ -18,6 +19,10 @@ use tower_http::add_extension::AddExtension;
 
 /// How long open connections may finish their answers after the jobs are put aside.
 const LAST_ANSWERS: Duration = Duration::from_secs(3);
+/// Open files that the service needs for itself.
+const OWN_FILES: u64 = 64;
+/// A connection, and a picture or an asset that goes through it.
+const FILES_PER_CONNECTION: u64 = 2;
 /// Without room for another connection (too many open files), accepting is tried again after this time.
 const ACCEPT_AGAIN: Duration = Duration::from_millis(100);
 
@@ -31,7 +36,7 @@ pub async fn serve(
     shutdown: impl Future<Output = ()> + Send,
 ) -> io::Result<()> {
     let jobs = Arc::clone(&state.jobs);
-    let room = Arc::new(Semaphore::new(state.settings.connections as usize));
+    let room = Arc::new(Semaphore::new(connections_within_reason(state.settings.connections)));
     let head_time = state.settings.head_time;
     let router = router(state);
     let graceful = GracefulShutdown::new();
@@ -70,6 +75,22 @@ pub async fn serve(
     // Whoever does not take the last answer in time goes without.
     let _ = tokio::time::timeout(LAST_ANSWERS, graceful.shutdown()).await;
     Ok(())
+}
+
+/// How many connections may be open at once: as many as wanted, if this process may open so many files. It asks for as
+/// many as it can get, since many systems begin with 1024; what is left over is for pictures and the database, which
+/// must not fail because of clients.
+fn connections_within_reason(wanted: u32) -> usize {
+    let limit = getrlimit(Resource::Nofile);
+    // Where this is refused, the limit stays as it is.
+    let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
+    let files = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
+    let room = files.saturating_sub(OWN_FILES) / FILES_PER_CONNECTION;
+    let most = u32::try_from(room).unwrap_or(u32::MAX).clamp(1, wanted.max(1));
+    if most < wanted {
+        tracing::warn!(wanted, most, files, "fewer connections than wanted: too few files may be open");
+    }
+    most as usize
 }
 
 /// The next connection, once there is room for it.

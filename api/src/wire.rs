@@ -42,6 +42,9 @@ pub struct JobView {
     started_at: Option<String>,
     #[schema(format = DateTime)]
     finished_at: Option<String>,
+    /// When it is cancelled if it is not done by then, from `?cancel_after=`.
+    #[schema(format = DateTime)]
+    cancel_at: Option<String>,
     /// When it will be forgotten with its pictures.
     #[schema(format = DateTime)]
     expires_at: Option<String>,
@@ -74,7 +77,7 @@ impl JobView {
     /// The job in full.
     #[must_use]
     pub fn full(status: Status) -> Self {
-        let Status { job, expires_ms, progress, queue_position } = status;
+        let Status { job, expires_ms, progress, queue_position, .. } = status;
         let links = links_of(&job);
         let known = progress.unwrap_or_default();
         let fraction = if job.state == JobState::Succeeded { 1.0 } else { known.fraction };
@@ -96,6 +99,7 @@ impl JobView {
             created_at: rfc3339(job.created_ms),
             started_at: job.started_ms.map(rfc3339),
             finished_at: job.finished_ms.map(rfc3339),
+            cancel_at: job.cancel_ms.map(rfc3339),
             expires_at: expires_ms.map(rfc3339),
             history: Some(job.history),
             plan: job.plan,
@@ -186,6 +190,10 @@ pub struct CreateQuery {
     /// The client's own name for the job; need not be unique.
     #[param(max_length = 200)]
     pub label: Option<String>,
+    /// Seconds after which nobody waits for the picture any more: the job is cancelled if it is not done by then,
+    /// counted from its submission.
+    #[param(minimum = 1, maximum = 604_800)]
+    pub cancel_after: Option<u32>,
 }
 
 /// What would run for a scene, what is left out, and why.

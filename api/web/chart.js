@@ -1,30 +1,38 @@
 // The error of a render against its time, both on logarithmic axes: straight lines are power laws.
 
 const SVG = "http://www.w3.org/2000/svg";
-const BOX = { left: 46, right: 404, top: 8, bottom: 118 };
+const HEIGHT = 200;
+const WIDEST = 640;
+const MARGIN = { left: 52, right: 10, top: 26, bottom: 40 };
 
 /** Draws `[{ rounds, seconds, error }]` into an <svg>; hides it while there is nothing to compare. */
 export function drawErrorChart(svg, history) {
   const points = history.filter((point) => point.seconds > 0 && point.error > 0);
   svg.toggleAttribute("hidden", points.length < 2);
   if (points.length < 2) return;
-  const x = axis(points.map((point) => point.seconds), BOX.left, BOX.right);
-  const y = axis(points.map((point) => point.error), BOX.bottom, BOX.top);
+  // One unit is one pixel, so that the words are of one size on every screen.
+  const width = Math.min(svg.parentElement.clientWidth || WIDEST, WIDEST);
+  const [left, right, top, bottom] = [MARGIN.left, width - MARGIN.right, MARGIN.top, HEIGHT - MARGIN.bottom];
+  const x = axis(points.map((point) => point.seconds), left, right);
+  const y = axis(points.map((point) => point.error), bottom, top);
   const path = points.map((point) => `${x.at(point.seconds).toFixed(1)} ${y.at(point.error).toFixed(1)}`);
   const [first, last] = [points[0], points.at(-1)];
+  svg.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
   svg.setAttribute("aria-label",
     `Estimated error fell from ${percent(first.error)} after ${seconds(first.seconds)} to ${percent(last.error)} after ${seconds(last.seconds)}`);
   svg.replaceChildren(
+    text(0, 12, "start", "Estimated error", "title"),
+    text(right, HEIGHT - 4, "end", "Time of rendering", "title"),
     ...x.ticks.flatMap((tick) => [
-      make("path", { class: "axis", d: `M${x.at(tick)} ${BOX.top}V${BOX.bottom}` }),
-      text(x.at(tick), BOX.bottom + 14, "middle", seconds(tick)),
+      make("path", { class: "axis", d: `M${x.at(tick)} ${top}V${bottom}` }),
+      text(x.at(tick), bottom + 16, "middle", seconds(tick)),
     ]),
     ...y.ticks.flatMap((tick) => [
-      make("path", { class: "axis", d: `M${BOX.left} ${y.at(tick)}H${BOX.right}` }),
-      text(BOX.left - 6, y.at(tick) + 4, "end", percent(tick)),
+      make("path", { class: "axis", d: `M${left} ${y.at(tick)}H${right}` }),
+      text(left - 7, y.at(tick) + 4, "end", percent(tick)),
     ]),
     make("path", { class: "line", d: `M${path.join("L")}` }),
-    ...points.map((point) => make("circle", { class: "dot", cx: x.at(point.seconds), cy: y.at(point.error), r: 2.6 })),
+    ...points.map((point) => make("circle", { class: "dot", cx: x.at(point.seconds), cy: y.at(point.error), r: 3 })),
   );
 }
 
@@ -40,8 +48,8 @@ function axis(values, from, to) {
   return { at, ticks: fine.length <= 6 ? fine : within([1]) };
 }
 
-function text(x, y, anchor, words) {
-  const element = make("text", { x, y, "text-anchor": anchor });
+function text(x, y, anchor, words, kind = "tick") {
+  const element = make("text", { x, y, "text-anchor": anchor, class: kind });
   element.textContent = words;
   return element;
 }

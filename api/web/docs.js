@@ -3,6 +3,8 @@
 import { make } from "./recent.js";
 
 const $ = (id) => document.getElementById(id);
+/** What most people come for comes first. */
+const ORDER = ["renders", "pictures", "scenes", "assets", "access", "health"];
 /** Deeper than this, schemas are named and not written out. */
 const DEEPEST = 6;
 
@@ -13,7 +15,7 @@ async function start() {
   if (!answer.ok) throw new Error(answer.statusText);
   const openapi = await answer.json();
   $("about").textContent = `${openapi.info.description} Version ${openapi.info.version}.`;
-  const groups = new Map();
+  const groups = new Map(ORDER.map((tag) => [tag, []]));
   for (const [path, methods] of Object.entries(openapi.paths)) {
     for (const [method, operation] of Object.entries(methods)) {
       const tag = operation.tags?.[0] ?? "other";
@@ -22,6 +24,7 @@ async function start() {
     }
   }
   for (const [tag, operations] of groups) {
+    if (!operations.length) continue;
     const title = Object.assign(make("h2", "", tag), { id: tag });
     $("contents").append(Object.assign(make("a", "", tag), { href: `#${tag}` }));
     $("addresses").append(title, ...operations);

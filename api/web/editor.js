@@ -41,7 +41,7 @@ export class Editor {
 
   set text(text) {
     this.#area.value = text;
-    this.#area.scrollTop = 0;
+    this.#area.scrollTop = this.#area.scrollLeft = 0;
     this.clearProblem();
     this.#numberLines();
   }
@@ -64,19 +64,26 @@ export class Editor {
     this.#problem.hidden = false;
     if (!errors.length) return;
     this.#area.setAttribute("aria-invalid", "true");
-    const lines = errors.map((one) => one.line).filter(Boolean);
-    this.#numberLines(new Set(lines));
-    if (jump && lines.length) this.selectLine(lines[0]);
+    const placed = errors.filter((one) => one.line);
+    this.#numberLines(new Set(placed.map((one) => one.line)));
+    // A name that is misspelt is more to the point than the one that is missed for it.
+    if (jump && placed.length) this.#goTo(placed.find((one) => one.code === "unknown_field") ?? placed[0]);
   }
 
-  selectLine(number) {
+  /** Selects what an error is about: the name or value at its column, or all of its line. */
+  #goTo({ line, column = 1 }) {
     const area = this.#area;
     const lines = area.value.split("\n");
-    const start = lines.slice(0, number - 1).reduce((sum, line) => sum + line.length + 1, 0);
+    const text = lines[line - 1] ?? "";
+    const start = lines.slice(0, line - 1).reduce((sum, one) => sum + one.length + 1, 0);
+    const word = /^(?:"(?:[^"\\]|\\.)*"?|[\w.+-]+)/.exec(text.slice(column - 1))?.[0];
+    const [from, to] = word ? [column - 1, column - 1 + word.length] : [0, text.length];
     area.focus({ preventScroll: true });
-    area.setSelectionRange(start, start + (lines[number - 1]?.length ?? 0));
+    area.setSelectionRange(start + from, start + to);
     const height = area.scrollHeight / lines.length;
-    area.scrollTop = Math.max(0, (number - 1) * height - area.clientHeight / 2);
+    area.scrollTop = Math.max(0, (line - 1) * height - area.clientHeight / 2);
+    const end = this.#widthOf(text.slice(0, word ? to : column - 1));
+    area.scrollLeft = end < area.clientWidth - 40 ? 0 : end - area.clientWidth / 2;
     area.scrollIntoView({ block: "nearest" });
   }
 
@@ -86,11 +93,11 @@ export class Editor {
       const item = make("li");
       if (error.line) {
         const jump = Object.assign(make("button", "jump", `line ${error.line}`), { type: "button" });
-        jump.addEventListener("click", () => this.selectLine(error.line));
+        jump.addEventListener("click", () => this.#goTo(error));
         item.append(jump);
       }
       if (error.pointer) item.append(make("code", "", error.pointer));
-      item.append(make("span", "", error.detail));
+      item.append(sentence(error.detail));
       list.append(item);
     }
     return list;
@@ -151,14 +158,19 @@ export class Editor {
     const before = area.value.slice(0, this.#open.from).split("\n");
     const style = getComputedStyle(area);
     const line = parseFloat(style.lineHeight);
-    const ruler = document.createElement("canvas").getContext("2d");
-    ruler.font = style.font;
-    const left = area.offsetLeft + parseFloat(style.paddingLeft) + ruler.measureText(before.at(-1)).width - area.scrollLeft;
+    const left = area.offsetLeft + parseFloat(style.paddingLeft) + this.#widthOf(before.at(-1)) - area.scrollLeft;
     const top = parseFloat(style.paddingTop) + before.length * line - area.scrollTop;
     const box = this.#list;
     box.style.left = `${Math.max(4, Math.min(left, area.parentElement.clientWidth - box.offsetWidth - 4))}px`;
     const above = top + box.offsetHeight > area.clientHeight && top - line > box.offsetHeight;
     box.style.top = `${above ? top - line - box.offsetHeight : top}px`;
+  }
+
+  /** Of a piece of text in the editor, in pixels. */
+  #widthOf(text) {
+    const ruler = document.createElement("canvas").getContext("2d");
+    ruler.font = getComputedStyle(this.#area).font;
+    return ruler.measureText(text).width;
   }
 
   #choose(index) {
@@ -184,6 +196,13 @@ export class Editor {
     this.#area.setAttribute("aria-expanded", "false");
     this.#area.removeAttribute("aria-activedescendant");
   }
+}
+
+/** What the service wrote between backticks is a name. */
+function sentence(words) {
+  const span = make("span");
+  span.append(...words.split("`").map((part, i) => (i % 2 ? make("code", "", part) : part)));
+  return span;
 }
 
 const byId = (id) => document.getElementById(id);

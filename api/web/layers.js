@@ -11,9 +11,12 @@ const MEANING = {
   indirect: "light that other surfaces have scattered",
 };
 
+const ERROR_MAP = "Estimated error of each pixel: dark 0.1 % or less, bright 100 %.";
+
 export class Layers {
   #group = document.getElementById("layers");
   #canvas = document.getElementById("mix");
+  #words = document.getElementById("layer-words");
   #job = null;
   #classes = [];
   #on = new Set(); // of the classes
@@ -33,6 +36,7 @@ export class Layers {
     this.#job = null;
     this.#turn += 1;
     this.#group.hidden = true;
+    this.#words.hidden = true;
     this.#canvas.hidden = true;
     this.#light.clear();
     this.#display = null;
@@ -50,10 +54,11 @@ export class Layers {
     const named = names.filter((name) => !this.#classes.includes(name));
     const buttons = this.#classes.map((name) => this.#switch(name));
     buttons.push(...named.map((name) => this.#single(`layer_${name}`, name, "A layer that the scene names, by itself")));
-    if (job.links.error) buttons.push(this.#single("error", "error map", "Estimated error of each pixel: dark 0.1 %, bright 100 %"));
+    if (job.links.error) buttons.push(this.#single("error", "error map", ERROR_MAP));
     buttons.find((button) => button.dataset.alone)?.classList.add("first-alone");
     this.#group.replaceChildren(...buttons);
     this.#group.hidden = !buttons.length;
+    this.#words.hidden = !buttons.length;
     this.#update();
   }
 
@@ -86,6 +91,7 @@ export class Layers {
       const { layer, alone } = button.dataset;
       button.setAttribute("aria-pressed", layer ? !this.#alone && this.#on.has(layer) : alone === this.#alone);
     }
+    this.#words.textContent = this.#meaning();
     const { links, name } = this.#job;
     if (this.#alone) return this.#whole(links[this.#alone], this.#alone === "error" ? `Estimated error of ${name}: dark is exact, bright is wrong` : `${this.#alone.slice(6)} of ${name}`);
     if (this.#on.size === this.#classes.length) return this.#whole(links.image, `The finished picture: ${name}`);
@@ -93,6 +99,15 @@ export class Layers {
     const draw = (mixed) => turn === this.#turn && this.#draw(mixed, on);
     const fail = (error) => (this.#light.clear(), turn === this.#turn && this.failed(error));
     this.#mix(on).then(draw, fail);
+  }
+
+  /** What the frame shows, in words. */
+  #meaning() {
+    if (this.#alone === "error") return ERROR_MAP;
+    if (this.#alone) return `Only ${this.#alone.slice(6)}, a layer that the scene names.`;
+    if (this.#on.size === this.#classes.length) return "All light. Each kind of light path can be switched off and on.";
+    const on = this.#classes.filter((layer) => this.#on.has(layer));
+    return on.length ? `Only ${on.map((layer) => `${layer}: ${MEANING[layer]}`).join("; ")}.` : "All light is switched off.";
   }
 
   #whole(url, words) {

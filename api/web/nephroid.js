@@ -38,12 +38,15 @@ export class Nephroid {
     await this.#send("/v1/session", { method: "POST", headers, body: JSON.stringify({ key }) });
   }
 
-  /** Sends a scene (text, or an object to be written as JSON). Resolves with the job once it is on disk. */
-  async submit(scene, { idempotencyKey, label, signal } = {}) {
+  /**
+   * Sends a scene (text, or an object to be written as JSON). Resolves with the job once it is on disk. The service
+   * cancels it if it is not done `cancelAfter` seconds later.
+   */
+  async submit(scene, { idempotencyKey, label, cancelAfter, signal } = {}) {
     const headers = { "Content-Type": "application/json" };
     if (idempotencyKey) headers["Idempotency-Key"] = idempotencyKey;
-    const query = label ? `?${new URLSearchParams({ label })}` : "";
-    return (await this.#send(`/v1/renders${query}`, { method: "POST", headers, body: textOf(scene), signal })).json();
+    const given = Object.entries({ label, cancel_after: cancelAfter }).filter(([, value]) => value !== undefined);
+    return (await this.#send(`/v1/renders?${new URLSearchParams(given)}`, { method: "POST", headers, body: textOf(scene), signal })).json();
   }
 
   /** What would run for a scene, and why. */

@@ -5,7 +5,7 @@ import { Editor } from "./editor.js";
 import { Layers } from "./layers.js";
 import { drawSketch } from "./sketch.js";
 import { drawErrorChart } from "./chart.js";
-import { RecentRenders, WORDS, make } from "./recent.js";
+import { RecentRenders, WORDS, make, titled } from "./recent.js";
 
 /** A scene that rests this long is checked. */
 const CHECK_AFTER = 700;
@@ -30,6 +30,8 @@ start();
 async function start() {
   $("scene-form").addEventListener("submit", (event) => (event.preventDefault(), submitScene()));
   $("plan").addEventListener("click", showPlan);
+  // Not by its address, which names the job in the frame.
+  document.querySelector(".skip").addEventListener("click", (event) => (event.preventDefault(), editor.focus()));
   $("cancel").addEventListener("click", () => following && nephroid.cancel(following.id).then(showJob, showProblem));
   $("reuse").addEventListener("click", reuseScene);
   $("key-form").addEventListener("submit", signIn);
@@ -79,7 +81,7 @@ function card(sample, text) {
   const label = Object.assign(make("label", "card"), { title: sample.title });
   const input = Object.assign(make("input"), { type: "radio", name: "sample", value: sample.name });
   input.addEventListener("change", () => chooseSample(sample, text));
-  label.append(input, sample.picture ? pictureOf(sample) : sketchOf(text), make("span", "card-title", sample.title));
+  label.append(input, sample.picture ? pictureOf(sample) : sketchOf(text), make("span", "card-title", titled(sample.title)));
   return label;
 }
 
@@ -314,7 +316,8 @@ function setState(state, words) {
 
 function fillPlan(plan) {
   const all = plan.decisions ?? [];
-  const rows = [["Runs", true], ["Left out", false]].flatMap(([words, runs]) => {
+  const groups = [[["Runs", "how", "because"], true], [["Left out", "instead", "because"], false]];
+  const rows = groups.flatMap(([words, runs]) => {
     const some = all.filter((decision) => decision.runs === runs);
     return some.length ? [groupRow(words), ...some.map(decisionRow)] : [];
   });
@@ -325,7 +328,7 @@ function fillPlan(plan) {
 
 function groupRow(words) {
   const row = make("tr", "group");
-  row.append(Object.assign(make("th", "", words), { scope: "rowgroup", colSpan: 3 }));
+  row.append(...words.map((word) => Object.assign(make("th", "", word), { scope: "col" })));
   return row;
 }
 

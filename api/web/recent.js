@@ -81,7 +81,7 @@ function linkTo(job, shown) {
   const state = make("span", "state", WORDS[job.state] + progress);
   state.dataset.state = job.state;
   const words = make("span", "job-words");
-  words.append(make("span", "job-name", job.name || "unnamed scene"),
+  words.append(make("span", "job-name", titled(job.name || "unnamed scene")),
                make("span", "quiet", `${when(job.created_at)} · ${job.width} × ${job.height}`), state);
   link.append(picture, words);
   return link;
@@ -96,6 +96,9 @@ export function make(tag, className = "", text = "") {
   if (text) element.textContent = text;
   return element;
 }
+
+/** A name as a title begins. */
+export const titled = (name) => name.charAt(0).toUpperCase() + name.slice(1);
 
 function when(time) {
   const date = new Date(time);

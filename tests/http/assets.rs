@@ -1,9 +1,11 @@
 //! Files that scenes refer to.
 
-use crate::server::{Server, quick};
+use crate::server::{Server, quick, until};
 use reqwest::{Response, StatusCode};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
 
 /// A tetrahedron of glass where the ball was.
 const MESH: &str =
@@ -65,13 +67,43 @@ async fn content_that_is_not_what_its_name_says_is_not_kept() {
         assert_eq!(put(&server, name, MESH).await.status(), StatusCode::BAD_REQUEST, "{name}");
         assert_eq!(server.get(&format!("/v1/assets/{name}")).await.status(), StatusCode::NOT_FOUND, "{name}");
     }
-    let left = std::fs::read_dir(data.path().join("assets")).unwrap().count();
-    assert_eq!(left, 0, "nothing is left of it");
+    // The answer does not wait until its pieces are removed.
+    let nothing_left = || std::fs::read_dir(data.path().join("assets")).unwrap().next().is_none();
+    until(async || nothing_left().then_some(())).await;
+}
+
+/// Begins an upload, and goes no further.
+async fn begin(server: &Server) -> TcpStream {
+    let head = format!(
+        "PUT /v1/assets/{} HTTP/1.1\r\nhost: x\r\nconnection: close\r\ncontent-length: 100\r\n\r\nv",
+        name_of(b"what never comes")
+    );
+    let mut stream = TcpStream::connect(server.base.strip_prefix("http://").unwrap()).await.unwrap();
+    stream.write_all(head.as_bytes()).await.unwrap();
+    stream
+}
+
+#[tokio::test]
+async fn uploads_that_never_end_hold_nobody_up() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &["--rate", "0"]);
+    let mut open = Vec::new();
+    for _ in 0..600 {
+        open.push(begin(&server).await);
+    }
+    // More than the service takes at once: the last is told so, and everybody else is served.
+    let mut answer = [0; 12];
+    open.pop().unwrap().read_exact(&mut answer).await.unwrap();
+    assert_eq!(&answer, b"HTTP/1.1 503");
+    let id = server.submit(&quick()).await;
+    server.wait_for_state(&id, "succeeded").await;
+    drop(open);
+    until(async || put(&server, &name_of(MESH.as_bytes()), MESH).await.status().is_success().then_some(()))
+        .await;
 }
 
 #[tokio::test]
 async fn an_upload_that_breaks_off_leaves_nothing() {
-    use tokio::io::AsyncWriteExt;
     let data = tempfile::tempdir().unwrap();
     let server = Server::start(data.path(), &[]);
     let folder = data.path().join("assets");

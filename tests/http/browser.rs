@@ -1,11 +1,12 @@
 //! The web page in a real browser.
 
-use crate::server::{DEADLINE, Server, until};
+use crate::server::{DEADLINE, Server, png_size, until};
 use fantoccini::{Client, ClientBuilder, Locator};
 use nephroid::develop::develop;
 use nephroid::image_io::{self, ImageFormat};
 use nephroid::scene::{ImageSettings, Tone};
 use serde_json::{Value, json};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 /// A chromedriver on a free port; killed when dropped.
@@ -36,7 +37,7 @@ impl Drop for Driver {
     }
 }
 
-async fn open_browser(driver: &Driver, profile: &std::path::Path, mut options: Value) -> Client {
+async fn open_browser(driver: &Driver, profile: &Path, mut options: Value) -> Client {
     let arguments = [
         "--headless",
         "--no-sandbox",
@@ -75,6 +76,47 @@ async fn click(browser: &Client, selector: &str) {
     element.click().await.unwrap();
 }
 
+/// Options of a browser that saves what it downloads here, and asks nobody.
+fn saving_to(folder: &Path) -> Value {
+    json!({ "prefs": { "download.default_directory": folder, "download.prompt_for_download": false } })
+}
+
+/// The file with this ending, once the browser has saved it: until then it has another name, or nothing in it.
+async fn saved(folder: &Path, ending: &str) -> Vec<u8> {
+    until(async || {
+        let files = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
+        let file = files.into_iter().find(|file| file.extension().is_some_and(|end| end == ending));
+        file.and_then(|file| std::fs::read(file).ok()).filter(|bytes| !bytes.is_empty())
+    })
+    .await
+}
+
+/// Presses keys wherever the focus is.
+async fn press(browser: &Client, keys: &str) {
+    browser.active_element().await.unwrap().send_keys(keys).await.unwrap();
+}
+
+/// Moves the focus on until it is there.
+async fn tab_to(browser: &Client, selector: &str) {
+    let there = format!("return document.activeElement.matches({selector:?})");
+    for _ in 0..100 {
+        press(browser, TAB).await;
+        if run(browser, &there).await == json!(true) {
+            return;
+        }
+    }
+    panic!("{selector} cannot be reached by keyboard");
+}
+
+/// Puts the caret before this text, as a click there does.
+async fn caret_before(browser: &Client, text: &str) {
+    let script = format!(
+        "const area = document.getElementById('scene'); area.focus();
+         area.setSelectionRange(area.value.indexOf({text:?}), area.value.indexOf({text:?}))"
+    );
+    run(browser, &script).await;
+}
+
 /// Puts a text into the editor as if it had been typed.
 async fn edit(browser: &Client, change: &str) {
     let script = format!(
@@ -93,6 +135,12 @@ async fn shrink(browser: &Client, [width, height]: [u32; 2], rounds: u32) {
     edit(browser, &change).await;
 }
 
+const TAB: &str = "\u{e004}";
+const ENTER: &str = "\u{e007}";
+const CTRL_ENTER: &str = "\u{e009}\u{e007}";
+const BACKSPACE: &str = "\u{e003}";
+const RIGHT: &str = "\u{e014}";
+
 const SUCCEEDED: &str = "span#state[data-state=succeeded]";
 /// The picture in the frame: its address and size.
 const SHOWN: &str = "const image = document.getElementById('image');
@@ -100,10 +148,10 @@ const SHOWN: &str = "const image = document.getElementById('image');
 
 #[tokio::test]
 async fn a_visitor_mends_a_scene_watches_it_and_takes_it_home() {
-    let (data, profile) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let [data, profile, home] = [(); 3].map(|()| tempfile::tempdir().unwrap());
     let server = Server::start(data.path(), &[]);
     let driver = Driver::start();
-    let browser = open_browser(&driver, profile.path(), json!({})).await;
+    let browser = open_browser(&driver, profile.path(), saving_to(home.path())).await;
     browser.goto(&server.base).await.unwrap();
     click(&browser, "input[name=sample][value=glass-ball]").await;
     shrink(&browser, [160, 120], 64).await;
@@ -113,7 +161,9 @@ async fn a_visitor_mends_a_scene_watches_it_and_takes_it_home() {
     edit(&browser, bright).await;
 
     // A mistake is shown at its line while it is typed, and is selected when it is submitted.
-    edit(&browser, "(text) => text.replace('\"radius\"', '\"extra\": 1, \"radius\"')").await;
+    let mistake = "\"extra\": 1, ";
+    caret_before(&browser, "\"radius\"").await;
+    press(&browser, mistake).await;
     let marked =
         "const mark = document.querySelector('#gutter .wrong'); return mark && mark.textContent.trim()";
     let line = seen(&browser, marked).await;
@@ -125,7 +175,8 @@ async fn a_visitor_mends_a_scene_watches_it_and_takes_it_home() {
     assert_eq!(server.get_json("/v1/renders").await["renders"], json!([]));
 
     // Mended; the picture sharpens: previews after different numbers of rounds.
-    edit(&browser, "(text) => text.replace('\"extra\": 1, ', '')").await;
+    caret_before(&browser, "\"radius\"").await;
+    press(&browser, &BACKSPACE.repeat(mistake.len())).await;
     run(
         &browser,
         "window.rounds = new Set(); const image = document.getElementById('image');
@@ -147,12 +198,15 @@ async fn a_visitor_mends_a_scene_watches_it_and_takes_it_home() {
     assert!(shown[0].as_str().unwrap().ends_with("/image.png") && shown[1] == 160, "{shown}");
 
     check_layers(&browser, &server).await;
-    for (id, kind) in
-        [("download", "image/png"), ("download-exr", "image/x-exr"), ("download-chart", "image/svg+xml")]
-    {
-        let href = browser.find(Locator::Id(id)).await.unwrap().attr("href").await.unwrap().unwrap();
-        assert_eq!(server.get(&href).await.headers()["content-type"], kind);
+    for id in ["download", "download-exr", "download-chart"] {
+        click(&browser, &format!("#{id}")).await;
     }
+    let id = run(&browser, "return location.hash.slice(1)").await;
+    let png = saved(home.path(), "png").await;
+    assert_eq!(png_size(&png), [160, 120]);
+    assert!(png == server.png(id.as_str().unwrap()).await, "the file is the picture");
+    assert!(image_io::decode(&saved(home.path(), "exr").await, ImageFormat::Exr).is_ok());
+    assert!(String::from_utf8(saved(home.path(), "svg").await).unwrap().contains("<svg"));
     // The address of a job is enough to come back to it.
     browser.refresh().await.unwrap();
     browser.wait().at_most(DEADLINE).for_element(Locator::Css(SUCCEEDED)).await.unwrap();
@@ -221,7 +275,65 @@ async fn cancel_another(browser: &Client, server: &Server) {
 }
 
 #[tokio::test]
-async fn the_keyboard_is_enough_and_the_editor_knows_what_may_come() {
+async fn the_keyboard_is_enough() {
+    let [data, profile, home] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    let server = Server::start(data.path(), &[]);
+    let driver = Driver::start();
+    let browser = open_browser(&driver, profile.path(), saving_to(home.path())).await;
+    browser.goto(&server.base).await.unwrap();
+    let chosen = "return document.querySelector('input[name=sample]:checked')?.value";
+    let first = seen(&browser, chosen).await;
+
+    // Past the gallery into the editor, or through the gallery.
+    tab_to(&browser, ".skip").await;
+    press(&browser, ENTER).await;
+    seen(&browser, "return document.activeElement.id === 'scene'").await;
+    browser.refresh().await.unwrap();
+    assert_eq!(seen(&browser, chosen).await, first);
+    tab_to(&browser, "input[name=sample]").await;
+    press(&browser, RIGHT).await;
+    assert_ne!(run(&browser, chosen).await, first);
+    tab_to(&browser, "#scene").await;
+    mend_by_keyboard(&browser).await;
+
+    // A layer off, the picture saved, another job stopped.
+    tab_to(&browser, "button[data-layer=direct]").await;
+    press(&browser, " ").await;
+    seen(&browser, "return document.activeElement.getAttribute('aria-pressed') === 'false'").await;
+    tab_to(&browser, "#download").await;
+    press(&browser, ENTER).await;
+    assert_eq!(png_size(&saved(home.path(), "png").await), [48, 36]);
+    shrink(&browser, [160, 120], 1_000_000).await;
+    caret_before(&browser, "{").await;
+    press(&browser, CTRL_ENTER).await;
+    browser.wait().at_most(DEADLINE).for_element(Locator::Css("#state[data-state=running]")).await.unwrap();
+    tab_to(&browser, "#cancel").await;
+    press(&browser, " ").await;
+    browser.wait().at_most(DEADLINE).for_element(Locator::Css("#state[data-state=cancelled]")).await.unwrap();
+    browser.close().await.unwrap();
+}
+
+/// In the editor: a mistake, the way to its line, mended, rendered.
+async fn mend_by_keyboard(browser: &Client) {
+    shrink(browser, [48, 36], 2).await;
+    let mistake = "\"extra\": 1, ";
+    caret_before(browser, "\"camera\"").await;
+    press(browser, mistake).await;
+    press(browser, CTRL_ENTER).await;
+    seen(browser, "return !document.getElementById('problem').hidden").await;
+    tab_to(browser, "button.jump").await;
+    press(browser, ENTER).await;
+    let line = "const area = document.getElementById('scene');
+        return document.activeElement === area && area.value.slice(area.selectionStart, area.selectionEnd)";
+    assert_eq!(seen(browser, line).await, "\"extra\"");
+    caret_before(browser, "\"camera\"").await;
+    press(browser, &BACKSPACE.repeat(mistake.len())).await;
+    press(browser, CTRL_ENTER).await;
+    browser.wait().at_most(DEADLINE).for_element(Locator::Css(SUCCEEDED)).await.unwrap();
+}
+
+#[tokio::test]
+async fn the_editor_knows_what_may_come() {
     let (data, profile) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let server = Server::start(data.path(), &[]);
     let driver = Driver::start();
@@ -259,7 +371,7 @@ async fn the_keyboard_is_enough_and_the_editor_knows_what_may_come() {
     scene.send_keys("\u{e007}[0, 0, 0]").await.unwrap();
     let text = run(&browser, "return document.getElementById('scene').value").await;
     assert!(text.as_str().unwrap().contains("\"velocity\": [0, 0, 0],"), "{text}");
-    scene.send_keys("\u{e009}\u{e007}").await.unwrap();
+    scene.send_keys(CTRL_ENTER).await.unwrap();
     browser.wait().at_most(DEADLINE).for_element(Locator::Css(SUCCEEDED)).await.unwrap();
     browser.close().await.unwrap();
 }

@@ -61,6 +61,46 @@ async fn a_cancelled_job_stays_cancelled_after_a_crash() {
 }
 
 #[tokio::test]
+async fn a_job_is_cancelled_when_its_client_will_have_given_up() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &["--concurrent", "1"]);
+    let submit = async |scene: &Value, seconds: u32| -> String {
+        let answer = server.post(&format!("/v1/renders?cancel_after={seconds}"), scene.to_string()).await;
+        assert_eq!(answer.status(), StatusCode::ACCEPTED);
+        answer.json::<Value>().await.unwrap()["id"].as_str().unwrap().to_owned()
+    };
+    let running = submit(&endless(), 1).await;
+    let job = server.wait_for_state(&running, "cancelled").await;
+    // Times in this form sort as they follow each other.
+    assert!(job["finished_at"].as_str() >= job["cancel_at"].as_str(), "{job:#}");
+    // One that would wait for ever.
+    let other = server.submit(&endless()).await;
+    server.wait_for_state(&other, "running").await;
+    let waiting = submit(&quick(), 1).await;
+    let job = server.wait_for_state(&waiting, "cancelled").await;
+    assert_eq!(job["attempt"], 0);
+    server.post(&format!("/v1/renders/{other}/cancel"), "").await;
+    // What is done in its time stays.
+    let soon = submit(&quick(), 600).await;
+    server.wait_for_state(&soon, "succeeded").await;
+    for wrong in ["0", "604801", "-1", "soon"] {
+        let answer = server.post(&format!("/v1/renders?cancel_after={wrong}"), quick().to_string()).await;
+        assert_eq!(answer.status(), StatusCode::BAD_REQUEST, "{wrong}");
+    }
+}
+
+#[tokio::test]
+async fn a_time_to_give_up_outlives_a_crash() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path(), &[]);
+    let answer = server.post("/v1/renders?cancel_after=2", endless().to_string()).await;
+    let id = answer.json::<Value>().await.unwrap()["id"].as_str().unwrap().to_owned();
+    server.kill();
+    let again = Server::start(data.path(), &[]);
+    again.wait_for_state(&id, "cancelled").await;
+}
+
+#[tokio::test]
 async fn a_deleted_job_is_gone_with_its_files() {
     let data = tempfile::tempdir().unwrap();
     let server = Server::start(data.path(), &[]);

@@ -28,8 +28,23 @@ impl Server {
         Self::start_with(data, arguments, "info", std::fs::File::create(log).unwrap().into())
     }
 
+    /// The same with so many files that it may open.
+    pub(crate) fn start_with_files(data: &Path, arguments: &[&str], files: u32) -> Self {
+        let mut shell = Command::new("sh");
+        shell.args([
+            "-c",
+            &format!("ulimit -n {files}; exec \"$0\" \"$@\""),
+            env!("CARGO_BIN_EXE_nephroid-api"),
+        ]);
+        Self::run(shell, data, arguments, "error", Stdio::inherit())
+    }
+
     fn start_with(data: &Path, arguments: &[&str], filter: &str, log: Stdio) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_nephroid-api"))
+        Self::run(Command::new(env!("CARGO_BIN_EXE_nephroid-api")), data, arguments, filter, log)
+    }
+
+    fn run(mut command: Command, data: &Path, arguments: &[&str], filter: &str, log: Stdio) -> Self {
+        let mut child = command
             .args(["serve", "--listen", "127.0.0.1:0", "--data"])
             .arg(data)
             .args(arguments)

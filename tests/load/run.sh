@@ -22,6 +22,7 @@ LUA
 # The renderer is idle: nothing is taken from the queue.
 start --concurrent 0 --queue 10000000
 wrk -t1 -c128 -d"${seconds}s" --latency -s "$work/post.lua" "$api/v1/renders" | report "POST /v1/renders, durable, 128 connections"
+wrk -t1 -c32 -d"${seconds}s" --latency -s "$work/post.lua" "$api/v1/renders" | report "POST /v1/renders, durable, 32 connections"
 id=$(submit "$(scene 64 64 1)")
 wrk -t1 -c64 -d"${seconds}s" --latency "$api/v1/renders/$id" | report "GET /v1/renders/{id}, waiting job, 64 connections"
 stop

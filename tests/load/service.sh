@@ -17,5 +17,6 @@ stop() { kill "$server"; wait "$server" || true; server=; }
 
 # Width, height, rounds.
 scene() { printf '{"nephroid":1,"image":{"width":%d,"height":%d},"camera":{"type":"perspective","eye":[0,2.4,4.2],"target":[0,0.2,0],"fov":36},"materials":{"floor":{"type":"diffuse","albedo":[0.7,0.7,0.7]},"glass":{"type":"glass","ior":1.5}},"objects":[{"type":"polygon","vertices":[[-3,0,3],[3,0,3],[3,0,-3],[-3,0,-3]],"material":"floor"},{"type":"sphere","center":[0,0.55,0],"radius":0.5,"material":"glass"}],"lights":[{"type":"point","position":[1,3,1],"intensity":[5,5,5]}],"render":{"stop":{"rounds":%d}}}' "$1" "$2" "$3"; }
-submit() { curl -sf "$api/v1/renders" -H 'Content-Type: application/json' -d "$1" | sed 's/.*"id":"\([^"]*\)".*/\1/'; }
+# A scene, and what else curl should send.
+submit() { curl -sf "$api/v1/renders" -H 'Content-Type: application/json' -d "$@" | sed 's/.*"id":"\([^"]*\)".*/\1/'; }
 finished() { until curl -sf "$api/v1/renders/$1" | grep -q '"done":true'; do sleep 0.05; done; }

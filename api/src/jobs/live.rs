@@ -142,12 +142,24 @@ pub(super) struct Registry {
     jobs: Mutex<HashMap<JobId, Arc<Live>>>,
     changes: broadcast::Sender<Change>,
     draining: AtomicBool,
+    /// Seconds of rendering that a job takes, by those that have ended.
+    pace: Mutex<f64>,
 }
+
+/// What a job is taken to need before any has ended, in seconds.
+const FIRST_PACE: f64 = 1.0;
+/// How much each job that ends moves what the next one is taken to need.
+const PACE_WEIGHT: f64 = 0.25;
 
 impl Default for Registry {
     fn default() -> Self {
         let (changes, _) = broadcast::channel(BACKLOG);
-        Self { jobs: Mutex::default(), changes, draining: AtomicBool::new(false) }
+        Self {
+            jobs: Mutex::default(),
+            changes,
+            draining: AtomicBool::new(false),
+            pace: Mutex::new(FIRST_PACE),
+        }
     }
 }
 
@@ -168,6 +180,14 @@ impl Registry {
         self.announce(id);
     }
 
+    /// Stops the round of a job that was cancelled, and calls it out.
+    pub(super) fn stop(&self, id: JobId) {
+        if let Some(live) = self.get(id) {
+            live.control.cancel();
+        }
+        self.announce(id);
+    }
+
     pub(super) fn get(&self, id: JobId) -> Option<Arc<Live>> {
         lock(&self.jobs).get(&id).cloned()
     }
@@ -179,6 +199,17 @@ impl Registry {
 
     pub(super) fn listen(&self) -> broadcast::Receiver<Change> {
         self.changes.subscribe()
+    }
+
+    /// A job has ended after so many seconds of rendering.
+    pub(super) fn job_took(&self, seconds: f64) {
+        let mut pace = lock(&self.pace);
+        *pace += PACE_WEIGHT * (seconds - *pace);
+    }
+
+    /// Seconds of rendering that a job takes, by those that have ended.
+    pub(super) fn seconds_per_job(&self) -> f64 {
+        *lock(&self.pace)
     }
 
     /// Stops every round that runs, so that the jobs can be put aside.
@@ -195,4 +226,18 @@ impl Registry {
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // What is kept here is whole after every statement: a panic elsewhere does not spoil it.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_pace_follows_the_jobs_that_end() {
+        let registry = Registry::default();
+        (0..40).for_each(|_| registry.job_took(20.0));
+        assert!((registry.seconds_per_job() - 20.0).abs() < 0.1);
+        registry.job_took(0.0);
+        assert!(registry.seconds_per_job() > 10.0, "one small job says little of the next");
+    }
 }

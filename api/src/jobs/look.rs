@@ -24,7 +24,8 @@ impl Jobs {
             job.history = live.history();
         }
         let progress = live.map(|live| live.progress());
-        Ok(Status { expires_ms: self.expiry(&job), job, progress, queue_position })
+        let seconds_per_job = self.seconds_per_job();
+        Ok(Status { expires_ms: self.expiry(&job), job, progress, queue_position, seconds_per_job })
     }
 
     fn expiry(&self, job: &Job) -> Option<i64> {
@@ -77,7 +78,8 @@ impl Jobs {
         let status = |job: Job| {
             let live = self.registry.get(job.id).filter(|_| job.state == JobState::Running);
             let progress = live.map(|live| live.progress());
-            Status { expires_ms: self.expiry(&job), job, progress, queue_position: None }
+            let seconds_per_job = self.seconds_per_job();
+            Status { expires_ms: self.expiry(&job), job, progress, queue_position: None, seconds_per_job }
         };
         Ok(jobs.into_iter().map(status).collect())
     }

@@ -1,13 +1,14 @@
 //! Jobs: what one is, and the one function that moves it from state to state.
 //!
 //! `store` keeps them in SQLite (`schema` has the tables, `sql` and `query` the statements), `files` keeps large scenes,
-//! checkpoints and pictures beside it, `assets` what scenes refer to, `keys` who may come; `retention` forgets, `scheduler` renders
-//! them (`attempt` is one render of one job, `watchdog` ends those that take too long), `live` is what is known of a running
-//! job between two writes, and [`service::Jobs`] is all of it for the handlers.
+//! checkpoints and pictures beside it, `assets` what scenes refer to, `keys` who may come; `retention` forgets, `deadlines` cancels
+//! what nobody waits for any more, `scheduler` renders them (`attempt` is one render of one job, `watchdog` ends those that take
+//! too long), `live` is what is known of a running job between two writes, and [`service::Jobs`] is all of it for the handlers.
 
 mod answers;
 mod assets;
 mod attempt;
+mod deadlines;
 mod files;
 mod keys;
 mod live;
@@ -221,6 +222,8 @@ pub struct Job {
     pub started_ms: Option<i64>,
     /// When it was done.
     pub finished_ms: Option<i64>,
+    /// When it is cancelled if it is not done.
+    pub cancel_ms: Option<i64>,
     /// Rounds in the picture.
     pub rounds: u32,
     /// Estimated error of the picture.

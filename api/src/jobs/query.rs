@@ -67,6 +67,19 @@ pub(super) fn queue_position(db: &Connection, seq: i64) -> Result<u32, StoreErro
     Ok(db.prepare_cached(count)?.query_row([seq], |row| row.get(0))?)
 }
 
+/// When the next job is to be cancelled.
+pub(super) fn next_deadline(db: &Connection) -> Result<Option<i64>, StoreError> {
+    let next = "SELECT min(cancel_ms) FROM jobs WHERE cancel_ms IS NOT NULL AND finished_ms IS NULL";
+    Ok(db.prepare_cached(next)?.query_row([], |row| row.get(0))?)
+}
+
+/// The jobs that are to be cancelled by now.
+pub(super) fn due(db: &Connection, now_ms: i64) -> Result<Vec<JobId>, StoreError> {
+    let due = "SELECT id FROM jobs WHERE cancel_ms <= ?1 AND cancel_ms IS NOT NULL AND finished_ms IS NULL";
+    let mut find = db.prepare_cached(due)?;
+    Ok(find.query_map([now_ms], |row| parsed(row, 0))?.collect::<Result<_, _>>()?)
+}
+
 fn job_of(row: &Row<'_>) -> Result<Job, rusqlite::Error> {
     let failure = row.get::<_, Option<String>>("failure_code")?.zip(row.get("failure_detail")?);
     Ok(Job {
@@ -80,6 +93,7 @@ fn job_of(row: &Row<'_>) -> Result<Job, rusqlite::Error> {
         created_ms: row.get("created_ms")?,
         started_ms: row.get("started_ms")?,
         finished_ms: row.get("finished_ms")?,
+        cancel_ms: row.get("cancel_ms")?,
         rounds: row.get("rounds")?,
         error_estimate: row.get("error_estimate")?,
         stop_reason: row.get("stop_reason")?,

@@ -147,6 +147,7 @@ impl Scheduler {
             Turn::Continue => self.registry.announce(self.running[index].id),
             Turn::Over(end) => {
                 let attempt = self.remove(index);
+                self.registry.job_took(attempt.seconds());
                 self.metrics
                     .job_ended(end.as_ref().err().map(|failure| failure.code.as_str()), attempt.age());
                 self.conclude((attempt.id, attempt.fence), end);

@@ -4,7 +4,7 @@ use super::StoreError;
 use rusqlite::Connection;
 
 /// Each brings the tables from one version to the next; what has run once is never changed.
-const STEPS: [&str; 2] = [JOBS, OWNERS];
+const STEPS: [&str; 3] = [JOBS, OWNERS, DEADLINES];
 
 const JOBS: &str = "
 CREATE TABLE jobs (
@@ -102,6 +102,12 @@ CREATE TRIGGER job_goes AFTER DELETE ON jobs BEGIN
     UPDATE waiting SET queued = queued - (OLD.state = 'queued'),
         running = running - (OLD.state = 'running') WHERE owner = OLD.owner;
 END;
+";
+
+/// When a job is cancelled if it is not done.
+const DEADLINES: &str = "
+ALTER TABLE jobs ADD COLUMN cancel_ms INTEGER;
+CREATE INDEX jobs_by_deadline ON jobs (cancel_ms) WHERE cancel_ms IS NOT NULL AND finished_ms IS NULL;
 ";
 
 /// Makes the tables that are missing. Two processes may try at once: one of them finds nothing left to do.

@@ -3,6 +3,7 @@
 use super::answers::Answers;
 use super::assets::{Assets, OwnAssets, Upload};
 use super::attempt::Limits;
+use super::deadlines::{self, NewDeadline};
 use super::files::{Files, hex};
 use super::keys::KeyTable;
 use super::live::{Change, Progress, Registry};
@@ -58,6 +59,8 @@ pub struct Submission {
     pub owner: Owner,
     /// What its owner calls it.
     pub label: Option<String>,
+    /// After this time it is cancelled if it is not done.
+    pub cancel_after: Option<Duration>,
     /// The client's own name for the request.
     pub idempotency_key: Option<String>,
 }
@@ -82,6 +85,8 @@ pub struct Status {
     pub progress: Option<Progress>,
     /// How many jobs are before it, if it waits.
     pub queue_position: Option<u32>,
+    /// Seconds of rendering that a job takes, by those that have ended.
+    pub seconds_per_job: f64,
 }
 
 /// The picture so far, or why there is none.
@@ -105,6 +110,7 @@ pub struct Jobs {
     assets: Assets,
     keys: KeyTable,
     wake: mpsc::Sender<Wake>,
+    new_deadline: mpsc::Sender<NewDeadline>,
     render_thread: Mutex<Option<JoinHandle<()>>>,
     queue_limits: QueueLimits,
     min_free: u64,
@@ -135,7 +141,7 @@ impl Jobs {
             store: store.clone(),
             files: files.clone(),
             assets: assets.clone(),
-            metrics,
+            metrics: Arc::clone(&metrics),
             ended,
             registry: Arc::clone(&registry),
             pool: render_pool(settings)?,
@@ -157,6 +163,7 @@ impl Jobs {
         std::thread::Builder::new()
             .name("retention".into())
             .spawn(move || retention::run(policy, &own_store, (&own_files, &own_assets), &endings))?;
+        let new_deadline = deadlines::start(store.clone(), Arc::clone(&registry), metrics)?;
         Ok(Self {
             keys: KeyTable::new(store.clone()),
             store,
@@ -165,6 +172,7 @@ impl Jobs {
             assets,
             answers: Answers::default(),
             wake,
+            new_deadline,
             render_thread: Mutex::new(Some(thread)),
             queue_limits: QueueLimits { queued: settings.queue, unfinished: settings.jobs_per_key },
             min_free: settings.min_free as u64,
@@ -176,10 +184,12 @@ impl Jobs {
     /// Takes a job; when this returns, it is on disk.
     pub async fn submit(&self, submission: Submission) -> Result<Accepted, StoreError> {
         self.require_room()?;
-        let Submission { text, scene, owner, label, idempotency_key } = submission;
+        let Submission { text, scene, owner, label, cancel_after, idempotency_key } = submission;
         let fingerprint = || hex(&Sha256::digest(text.as_bytes()));
         let idempotency = idempotency_key.map(|key| IdempotencyKey { key, fingerprint: fingerprint() });
         let id = JobId::fresh();
+        let created_ms = now_ms();
+        let cancel_ms = cancel_after.map(|time| created_ms.saturating_add(retention::millis(time)));
         let bytes = text.len() as u64;
         let inline = text.len() <= INLINE_SCENE;
         let job = NewJob {
@@ -188,7 +198,8 @@ impl Jobs {
             name: scene.name().to_owned(),
             label,
             size: scene.size(),
-            created_ms: now_ms(),
+            created_ms,
+            cancel_ms,
             scene: None,
             bytes,
             assets: scene.assets,
@@ -211,7 +222,16 @@ impl Jobs {
                 self.registry.announce(id);
                 // The render thread is gone only while the service drains.
                 let _ = self.wake.send(Wake);
-                let status = Status { job, expires_ms: None, progress: None, queue_position: Some(before) };
+                if cancel_ms.is_some() {
+                    let _ = self.new_deadline.send(NewDeadline);
+                }
+                let status = Status {
+                    job,
+                    expires_ms: None,
+                    progress: None,
+                    queue_position: Some(before),
+                    seconds_per_job: self.seconds_per_job(),
+                };
                 Ok(Accepted { status, replayed: false })
             }
             (Submitted::Replayed(id), _) => {
@@ -238,6 +258,11 @@ impl Jobs {
         }
     }
 
+    /// Seconds of rendering that a job takes, by those that have ended.
+    pub(crate) fn seconds_per_job(&self) -> f64 {
+        self.registry.seconds_per_job()
+    }
+
     /// Cancels a job; one that is done stays as it is. True if it was not done.
     pub async fn cancel(&self, owner: &Owner, id: JobId) -> Result<bool, StoreError> {
         let whose = owner.clone();
@@ -247,10 +272,7 @@ impl Jobs {
         };
         match self.store.write(cancel).await {
             Ok(_) => {
-                if let Some(live) = self.registry.get(id) {
-                    live.control.cancel();
-                }
-                self.registry.announce(id);
+                self.registry.stop(id);
                 Ok(true)
             }
             Err(StoreError::IllegalMove(_)) => Ok(false),

@@ -26,6 +26,7 @@ pub(super) struct NewJob {
     pub label: Option<String>,
     pub size: [u32; 2],
     pub created_ms: i64,
+    pub cancel_ms: Option<i64>,
     /// The scene, unless it is large enough for a file of its own.
     pub scene: Option<String>,
     pub bytes: u64,
@@ -100,8 +101,8 @@ pub(super) fn insert(db: &Connection, job: &NewJob, limits: QueueLimits) -> Resu
     }
     let before = admit(db, &job.owner, limits)?;
     db.prepare_cached(
-        "INSERT INTO jobs (id, state, owner, name, label, width, height, created_ms, bytes)
-         VALUES (?1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+        "INSERT INTO jobs (id, state, owner, name, label, width, height, created_ms, bytes, cancel_ms)
+         VALUES (?1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
     )?
     .execute(params![
         job.id.to_string(),
@@ -111,7 +112,8 @@ pub(super) fn insert(db: &Connection, job: &NewJob, limits: QueueLimits) -> Resu
         job.size[0],
         job.size[1],
         job.created_ms,
-        job.bytes
+        job.bytes,
+        job.cancel_ms
     ])?;
     if let Some(scene) = &job.scene {
         db.prepare_cached("INSERT INTO scenes (job, text) VALUES (?1, ?2)")?
@@ -321,6 +323,7 @@ impl NewJob {
             label: None,
             size: [400, 300],
             created_ms: 0,
+            cancel_ms: None,
             scene: Some(text.into()),
             bytes: text.len() as u64,
             assets: Vec::new(),

@@ -3,7 +3,7 @@
 use super::renders::json_response;
 use crate::AppState;
 use crate::access::{COOKIE, owner_of};
-use crate::body::read_json_text;
+use crate::body::{Room, read_json_text};
 use crate::problem::Problem;
 use crate::wire::{Session, SessionRequest};
 use axum::body::Body;
@@ -35,7 +35,7 @@ pub(super) async fn create_session(
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, Problem> {
-    let text = read_json_text(&headers, body, MAX_BODY).await?;
+    let (text, _) = read_json_text(&headers, body, &Room::new(MAX_BODY)).await?;
     let request: SessionRequest =
         serde_json::from_str(&text).map_err(|error| Problem::bad_request(error.to_string()))?;
     if app.jobs.owner_of(&request.key).await?.is_none() {

@@ -33,6 +33,7 @@ pub(super) async fn put_asset(
     if !is_sha256(&sha256) {
         return Err(Problem::bad_request("An asset's name is its SHA-256: 64 digits, 0 to 9 and a to f."));
     }
+    let _place = app.room.for_upload()?;
     let upload = app.jobs.begin_upload(caller.0.clone())?;
     let new = receive(body, app.settings.max_asset, upload, sha256.clone()).await?;
     let bytes = app.jobs.asset(&caller.0, sha256.clone()).await?.1;

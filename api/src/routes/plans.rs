@@ -25,7 +25,7 @@ pub(super) async fn create_plan(
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, Problem> {
-    let text = read_json_text(&headers, body, app.settings.max_body).await?;
+    let (text, _taken) = read_json_text(&headers, body, &app.room).await?;
     let planned = app.planner.plan(text, app.jobs.assets_of(caller.0)).await?;
     Ok(json_response(StatusCode::OK, &planned.report()))
 }

@@ -4,7 +4,7 @@ use crate::AppState;
 use crate::access::Caller;
 use crate::body::read_json_text;
 use crate::jobs::service::{Accepted, Status, Submission};
-use crate::jobs::{Answer, JobId, Page};
+use crate::jobs::{Answer, JobId, Page, StoreError};
 use crate::problem::Problem;
 use crate::wire::{CreateQuery, JobList, JobView, ListQuery, Validated, job_path};
 use axum::body::Body;
@@ -26,6 +26,8 @@ const DEFAULT_PAGE: u32 = 20;
 const MAX_PAGE: u32 = 100;
 const MAX_KEY_LENGTH: usize = 255;
 const MAX_LABEL: usize = 200;
+/// Longest time, in seconds, after which a job may be told to end: a week.
+const MAX_CANCEL_AFTER: u32 = 604_800;
 
 /// Submit a scene
 ///
@@ -61,8 +63,13 @@ pub(super) async fn create_render(
     if query.label.as_ref().is_some_and(|label| label.chars().count() > MAX_LABEL) {
         return Err(Problem::bad_request(format!("`label` must have at most {MAX_LABEL} characters.")));
     }
+    if query.cancel_after.is_some_and(|seconds| !(1..=MAX_CANCEL_AFTER).contains(&seconds)) {
+        return Err(Problem::bad_request(format!(
+            "`cancel_after` must be from 1 to {MAX_CANCEL_AFTER} seconds."
+        )));
+    }
     let idempotency_key = idempotency_key(&headers)?;
-    let text = read_json_text(&headers, body, app.settings.max_body).await?;
+    let (text, taken) = read_json_text(&headers, body, &app.room).await?;
     let assets = app.jobs.assets_of(caller.0.clone());
     if query.validate_only {
         let plan = app.planner.plan(text, assets).await?.report();
@@ -70,8 +77,11 @@ pub(super) async fn create_render(
     }
     let (text, scene) = app.planner.read(text, assets).await?;
     let owner = caller.0.clone();
-    let submission = Submission { text, scene, owner, label: query.label, idempotency_key };
-    let Accepted { mut status, replayed } = app.jobs.submit(submission).await?;
+    let cancel_after = query.cancel_after.map(|seconds| Duration::from_secs(seconds.into()));
+    let submission = Submission { text, scene, owner, label: query.label, cancel_after, idempotency_key };
+    let Accepted { mut status, replayed } =
+        app.jobs.submit(submission).await.map_err(|error| refusal(&app, error))?;
+    drop(taken);
     let id = status.job.id;
     tracing::info!(job = %id, replayed, "accepted");
     if !replayed {
@@ -266,18 +276,34 @@ fn answer_created(id: JobId, status: Status) -> Response {
     response
 }
 
-/// When to look again; `None` once the job is done. A running job is asked for when a good part of what is left
-/// should have been made, by the speed at which it has advanced.
+/// When to look again; `None` once the job is done. A job is asked for when a good part of what is left should have been
+/// made: of one that runs by the speed at which it has advanced, of one that waits by what jobs before it took.
 fn retry_after_s(status: &Status) -> Option<u32> {
     if status.job.state.is_done() {
         return None;
     }
     let Some(progress) = status.progress else {
-        return Some((1 + status.queue_position.unwrap_or(0) / 4).min(30));
+        let before_its_end = f64::from(status.queue_position.unwrap_or(0)) + 1.0;
+        return Some(whole_seconds(before_its_end * status.seconds_per_job / 4.0));
     };
     let fraction = f64::from(progress.fraction);
     let left = if fraction > 0.0 { progress.seconds * (1.0 - fraction) / fraction } else { 1.0 };
-    Some((left / 4.0).ceil().clamp(1.0, 30.0) as u32)
+    Some(whole_seconds(left / 4.0))
+}
+
+/// Why a job was not taken. A place in a full queue is free again when about one job has ended.
+fn refusal(app: &AppState, error: StoreError) -> Problem {
+    match error {
+        StoreError::QueueFull(_) => {
+            Problem::from(error).retry_after(whole_seconds(app.jobs.seconds_per_job()))
+        }
+        error => Problem::from(error),
+    }
+}
+
+/// A time as clients are told it: never at once, never out of sight.
+fn whole_seconds(seconds: f64) -> u32 {
+    seconds.ceil().clamp(1.0, 30.0) as u32
 }
 
 fn preferred_wait(headers: &HeaderMap) -> Option<Duration> {
