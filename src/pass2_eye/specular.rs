@@ -20,10 +20,10 @@ use crate::spectrum;
 use glam::{Vec2, Vec3};
 
 /// Both ways are followed while each still carries this share of the pixel.
-const SPLIT_ABOVE: f32 = 0.02;
+const SPLIT_ABOVE: f32 = 0.002;
 
 /// A branch that carries less plays roulette.
-const ROULETTE_BELOW: f32 = 0.01;
+const ROULETTE_BELOW: f32 = 0.001;
 
 /// More S than this end the walk: between two mirrors of reflectance 0.95 it then carries 3 %.
 const MAX_BOUNCES: u32 = 64;
