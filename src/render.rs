@@ -240,7 +240,8 @@ impl Render {
         let Plan { caustics, classes, .. } = &self.plan;
         let gathered = !self.plan.photons.is_empty() && *caustics == Some(Caustics::Photons);
         let counted = gathered && classes.contains(PathClass::Caustic);
-        let smoothed = classes.contains(PathClass::Indirect) && *caustics != Some(Caustics::Backward);
+        let smoothed =
+            classes.contains(PathClass::Indirect) && self.scene.render.caustics != Caustics::Backward;
         let wanted = (counted || smoothed) && self.plan.radius == RadiusRule::Pixel;
         if wanted && self.footprints.size().0 == 0 {
             self.footprints = Footprints::trace(&self.scene, &self.plan.eye_media);

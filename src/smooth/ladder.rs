@@ -50,6 +50,14 @@ impl Level {
 /// Half widths of the windows over which noise and blur are averaged, from large to small.
 const WINDOWS: [usize; 5] = [48, 24, 12, 6, 4];
 
+/// The windows to look at. Most paths find nothing: where few have found anything a small window would see no noise.
+fn windows(gathered: Gathered) -> &'static [usize] {
+    match gathered {
+        Gathered::Photons => &WINDOWS,
+        Gathered::Indirect => &WINDOWS[..3],
+    }
+}
+
 /// Half width of the window over which the error of what was chosen is averaged.
 const ESTIMATE: usize = 6;
 
@@ -121,7 +129,7 @@ impl Ladder {
         let sums: Vec<Cost> =
             (0..levels.len()).into_par_iter().map(|level| costs.sums(level, segment.size)).collect();
         let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
-        let mut choices = choose(&levels, &sums, &counts, &weights);
+        let mut choices = choose(&levels, (&sums, &counts, windows(gathered)), &weights);
         estimate(&mut choices, &costs, &counts);
         Self { choices }
     }
@@ -197,7 +205,11 @@ impl Costs<'_> {
 }
 
 /// From large windows to small, the width with the least estimated error; one choice for every 2 × 2 pixels.
-fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -> Vec<Choice> {
+fn choose(
+    levels: &[Filtered],
+    (costs, counts, windows): (&[Cost], &Sums, &[usize]),
+    weights: &[f32],
+) -> Vec<Choice> {
     let (width, height) = (counts.width, counts.height);
     let widest = &levels[levels.len() - 1].halves;
     let lit = |i: usize| weights[i] > 0.0 && (widest[0][i] != Vec3::ZERO || widest[1][i] != Vec3::ZERO);
@@ -212,7 +224,7 @@ fn choose(levels: &[Filtered], costs: &[Cost], counts: &Sums, weights: &[f32]) -
                 if !block.clone().any(lit) {
                     continue;
                 }
-                let level = choose_level(costs, counts, (x, rows.start));
+                let level = choose_level((costs, counts, windows), (x, rows.start));
                 for i in block.filter(|&i| weights[i] > 0.0) {
                     // Where nothing is known, the next width that reaches something.
                     let reaches = |&level: &usize| levels[level].share[i].x > 0.0;
@@ -245,9 +257,9 @@ fn estimate(choices: &mut [Choice], costs: &Costs<'_>, counts: &Sums) {
 }
 
 /// The chosen width at a pixel.
-fn choose_level(costs: &[Cost], counts: &Sums, at: (usize, usize)) -> usize {
+fn choose_level((costs, counts, windows): (&[Cost], &Sums, &[usize]), at: (usize, usize)) -> usize {
     let mut chosen = 0;
-    for (step, &window) in WINDOWS.iter().enumerate() {
+    for (step, &window) in windows.iter().enumerate() {
         let mut estimates = [0.0_f32; LEVELS.len()];
         let mut bias = 0.0_f32;
         for (l, cost) in costs.iter().enumerate() {

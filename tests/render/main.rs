@@ -16,6 +16,7 @@ mod geometry_shapes;
 mod geometry_structures;
 mod glb;
 mod import;
+mod indirect;
 mod invariance;
 mod lab;
 mod light_images;

@@ -96,6 +96,20 @@ fn smooth_light_is_smoothed() {
     assert!(after < before / 3.0, "{after} {before}");
 }
 
+/// Through a lens no pixel has a footprint: there it is radiance that is smoothed, among pixels whose middles show the same.
+#[test]
+fn smooth_light_is_smoothed_through_a_lens() {
+    let (width, pixels) = (0.4, 64);
+    let mut value = mirrored_light(width, pixels);
+    value["camera"]["aperture"] = json!(0.01);
+    value["camera"]["focus_distance"] = json!(3.0);
+    let render = render(&value, 1, 2, 16);
+    let (picture, unsmoothed) = (render.layer(PathClass::Caustic), render.raw_layer(PathClass::Caustic));
+    let truth = truth(width, pixels as usize);
+    let (after, before) = (relative_errors(&picture, &truth), relative_errors(&unsmoothed, &truth));
+    assert!(after < before / 3.0, "{after} {before}");
+}
+
 /// The classic progressive estimate, to compare with: right in the mean, and not smoothed.
 #[test]
 fn the_progressive_radius_is_right_in_the_mean_and_not_smoothed() {
