@@ -184,6 +184,10 @@ impl Costs<'_> {
     /// Unbiased estimates for a pixel, relative: of what a width blurs away beyond one two steps finer, and of the noise it
     /// leaves.
     fn at(&self, level: usize, i: usize) -> (f32, f32) {
+        let weight = self.weights[i] * self.mask[i];
+        if weight <= 0.0 {
+            return (0.0, 0.0);
+        }
         let finer = level.saturating_sub(2);
         let (a, b) = (self.levels[level].halves[0][i], self.levels[level].halves[1][i]);
         let (fa, fb) = (self.levels[finer].halves[0][i], self.levels[finer].halves[1][i]);
@@ -191,16 +195,14 @@ impl Costs<'_> {
         let ratio = if level == 0 { 0.0 } else { LEVELS[finer].variance() / LEVELS[level].variance() };
         let whole = (1.0 - ratio).powi(-2);
         let d = a - b;
-        let weight = self.weights[i] * self.mask[i];
         (mean_channel((a - fa) * (b - fb)) * whole * weight, 0.25 * mean_channel(d * d) * weight)
     }
 
     /// Sums of the estimates of a width over windows.
     fn sums(&self, level: usize, size: (usize, usize)) -> Cost {
-        let plane = |f: &dyn Fn((f32, f32)) -> f32| {
-            Sums::new(size, (0..self.weights.len()).map(|i| f64::from(f(self.at(level, i)))))
-        };
-        Cost { bias: plane(&|c| c.0), noise: plane(&|c| c.1) }
+        let at: Vec<(f32, f32)> = (0..self.weights.len()).map(|i| self.at(level, i)).collect();
+        let plane = |one: fn(&(f32, f32)) -> f32| Sums::new(size, at.iter().map(|c| f64::from(one(c))));
+        Cost { bias: plane(|c| c.0), noise: plane(|c| c.1) }
     }
 }
 
