@@ -63,6 +63,13 @@ pub fn stats_json(render: &Render) -> Value {
             "photon_lookups": stats.eye.lookups,
             "short_lookups": stats.eye.short_lookups,
             "cut": stats.eye.cut,
+            "paths": stats.eye.paths,
+            "path_rays": stats.eye.path_rays,
+            "drawn": {
+                "lens_points": stats.eye.lens_points,
+                "moments": stats.eye.moments,
+                "wavelengths": stats.eye.wavelengths,
+            },
         },
         "kernel_radius_pixels": render.plan().radius.pixels(stats.rounds.saturating_sub(1)),
         "plan": plan_json(render.scene(), render.plan()),

@@ -17,6 +17,7 @@ use crate::sampling::{WAVELENGTH_DIMENSION, hash};
 use crate::scene::LightPoint;
 use crate::spectrum;
 use glam::Vec3;
+use std::cell::Cell;
 use std::f32::consts::PI;
 
 /// Sobol dimensions, of a stream of its own, that draw the direction in which a path goes on, its lobe, and whether.
@@ -47,8 +48,14 @@ impl EyeWalk<'_> {
     /// Adds up what a surface shows; true if it has a D part.
     pub(super) fn arrive(&mut self, branch: &Branch, arrival: &Arrival<'_>, sums: &mut PixelSums) -> bool {
         self.see_emitter(branch, arrival, sums);
-        let line = || spectrum::pick(self.sample.branch(branch.key).get(WAVELENGTH_DIMENSION));
-        let Some(bsdf) = Bsdf::new(arrival, line) else { return false };
+        let wavelengths = Cell::new(0);
+        let line = || {
+            wavelengths.set(1);
+            spectrum::pick(self.sample.branch(branch.key).get(WAVELENGTH_DIMENSION))
+        };
+        let bsdf = Bsdf::new(arrival, line);
+        self.counts.wavelengths += wavelengths.get();
+        let Some(bsdf) = bsdf else { return false };
         let seen = branch.scattered.map_or(0, |s| s.count) + 1;
         if seen > 1 && !self.wants_more(branch) {
             // The paths asked for end at the last D.

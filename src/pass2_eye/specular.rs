@@ -18,6 +18,7 @@ use crate::sampling::{SamplePoint, WAVELENGTH_DIMENSION, event_dimension};
 use crate::scene::Caustics;
 use crate::spectrum;
 use glam::{Vec2, Vec3};
+use std::cell::Cell;
 
 /// Both ways are followed while each still carries this share of the pixel.
 const SPLIT_ABOVE: f32 = 0.002;
@@ -54,6 +55,12 @@ pub struct EyeCounts {
     pub paths: u64,
     /// Rays among those above that they needed beyond that D.
     pub path_rays: u64,
+    /// Points drawn on the lens: none of a pinhole.
+    pub lens_points: u64,
+    /// Moments drawn: none where nothing moves.
+    pub moments: u64,
+    /// Wavelengths drawn: none where nothing takes light apart.
+    pub wavelengths: u64,
 }
 
 impl EyeCounts {
@@ -66,6 +73,9 @@ impl EyeCounts {
         self.cut += other.cut;
         self.paths += other.paths;
         self.path_rays += other.path_rays;
+        self.lens_points += other.lens_points;
+        self.moments += other.moments;
+        self.wavelengths += other.wavelengths;
     }
 }
 
@@ -174,6 +184,7 @@ impl<'a> EyeWalk<'a> {
     /// bring.
     pub(super) fn trace_moving(&mut self, raster: Vec2, photon_time: Option<f32>, sums: &mut PixelSums) {
         let lookups = std::mem::replace(&mut self.lookups, Lookups::Nowhere);
+        self.counts.moments += 1;
         self.time = self.sample.get(TIME_DIMENSION);
         self.trace(raster, sums);
         let Some(time) = photon_time else { return };
@@ -190,7 +201,10 @@ impl<'a> EyeWalk<'a> {
     pub(super) fn trace(&mut self, raster: Vec2, sums: &mut PixelSums) {
         let camera = &self.context.scene.camera;
         let ray = match camera.lens() {
-            Some(lens) => camera.ray_through(lens, raster, self.sample.get_2d(LENS_DIMENSION)),
+            Some(lens) => {
+                self.counts.lens_points += 1;
+                camera.ray_through(lens, raster, self.sample.get_2d(LENS_DIMENSION))
+            }
             None => camera.ray(raster),
         };
         self.stack.clear();
@@ -227,7 +241,12 @@ impl<'a> EyeWalk<'a> {
         // The main way ends at the first D.
         branch.main &= !rests;
         let pick = self.sample.branch(branch.key);
-        let interaction = arrival.interact(|| spectrum::pick(pick.get(WAVELENGTH_DIMENSION)));
+        let wavelengths = Cell::new(0);
+        let interaction = arrival.interact(|| {
+            wavelengths.set(1);
+            spectrum::pick(pick.get(WAVELENGTH_DIMENSION))
+        });
+        self.counts.wavelengths += wavelengths.get();
         self.scatter(&branch, &arrival, &interaction);
     }
 

@@ -54,7 +54,12 @@ impl Plan {
                 Paths::Complete => "`complete` asks for L(D|S)*DS*DS*E",
                 _ => "there are paths with two D and more among those asked for",
             };
-            self.decide("indirect light", true, "paths go on from each D", reason);
+            self.decide(
+                "indirect light",
+                true,
+                "paths go on from each D; what they find is smoothed over each surface",
+                reason,
+            );
             return;
         }
         self.decide("indirect light", false, "nothing", "the paths asked for end at the first D");

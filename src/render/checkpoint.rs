@@ -31,9 +31,22 @@ impl Render {
             put_f64(&mut out, time.wall);
             put_f64(&mut out, time.cpu);
         }
-        let EyeCounts { eye_rays, shadow_rays, lookups, short_lookups, cut, paths, path_rays } = self.eye;
+        let EyeCounts { eye_rays, shadow_rays, lookups, short_lookups, cut, .. } = self.eye;
+        let EyeCounts { paths, path_rays, lens_points, moments, wavelengths, .. } = self.eye;
         let windows = self.windows.len() as u64;
-        for count in [eye_rays, shadow_rays, lookups, short_lookups, cut, paths, path_rays, windows] {
+        for count in [
+            eye_rays,
+            shadow_rays,
+            lookups,
+            short_lookups,
+            cut,
+            paths,
+            path_rays,
+            lens_points,
+            moments,
+            wavelengths,
+            windows,
+        ] {
             put_u64(&mut out, count);
         }
         for tally in &self.windows {
@@ -77,6 +90,9 @@ impl Render {
             cut: take_u64(&mut bytes)?,
             paths: take_u64(&mut bytes)?,
             path_rays: take_u64(&mut bytes)?,
+            lens_points: take_u64(&mut bytes)?,
+            moments: take_u64(&mut bytes)?,
+            wavelengths: take_u64(&mut bytes)?,
         };
         if take_u64(&mut bytes)? != self.windows.len() as u64 {
             return None;

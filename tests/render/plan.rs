@@ -114,3 +114,36 @@ fn f57_a_light_inside_or_near_its_caster_reaches_it() {
         assert!(caustic.pixels.iter().any(|p| p[1] > 0.0), "light at y = {y}");
     }
 }
+
+/// Dimensions of the sampler that a scene does not need are not drawn: none of a lens, of time, of colour, of paths.
+#[test]
+fn what_a_scene_does_not_need_is_not_drawn() {
+    let drawn = |change: &dyn Fn(&mut Value)| {
+        let mut value =
+            scene(camera_above([0.0; 3], 3.0, 2.0), json!([floor(2.0, 0.0), ball("glass")]), lamp());
+        change(&mut value);
+        let eye = render(&value, 1, 2, 8).stats().eye;
+        [eye.lens_points, eye.moments, eye.wavelengths, eye.paths].map(|count| count > 0)
+    };
+    assert_eq!(drawn(&|_| {}), [false; 4]);
+    let lens = drawn(&|v| {
+        v["camera"]["aperture"] = json!(0.1);
+        v["camera"]["focus_distance"] = json!(3);
+    });
+    assert_eq!(lens, [true, false, false, false]);
+    let closed = drawn(&|v| {
+        v["camera"]["aperture"] = json!(0);
+        v["camera"]["shutter"] = json!([0, 0]);
+        v["objects"][1]["velocity"] = json!([1, 0, 0]);
+    });
+    assert_eq!(closed, [false; 4]);
+    let open = drawn(&|v| {
+        v["camera"]["shutter"] = json!([0, 0.1]);
+        v["objects"][1]["velocity"] = json!([1, 0, 0]);
+    });
+    assert_eq!(open, [false, true, false, false]);
+    let prism = drawn(&|v| v["materials"]["glass"]["abbe"] = json!(30));
+    assert_eq!(prism, [false, false, true, false]);
+    let complete = drawn(&|v| v["render"]["paths"] = json!("complete"));
+    assert_eq!(complete, [false, false, false, true]);
+}
