@@ -36,10 +36,11 @@ chart: stability
 	mkdir -p docs/charts
 	cp $(foreach figure,$(FIGURES),chart/$(figure).svg) docs/charts/
 
-# The same as a look of three minutes; `PROFILE=` for the profile of the tests, which are compiled already.
+# The same of three scenes, as a look of three minutes; `PROFILE=` for the profile of the tests, which are compiled already.
 PROFILE = --release
+CHARTED_QUICK = scenes/glass-ball.json scenes/ring.json scenes/cornell.json
 chart-quick:
-	cargo run $(PROFILE) --package nephroid -- chart $(CHARTED) -o chart-quick --quick --scaling
+	cargo run $(PROFILE) --package nephroid -- chart $(CHARTED_QUICK) -o chart-quick --quick --scaling
 
 # Scenes in which methods of this kind break, by every method: stability/index.html.
 stability:
