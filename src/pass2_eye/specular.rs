@@ -20,11 +20,13 @@ use crate::spectrum;
 use glam::{Vec2, Vec3};
 use std::cell::Cell;
 
-/// Both ways are followed while each still carries this share of the pixel.
-const SPLIT_ABOVE: f32 = 0.002;
-
-/// A branch that carries less plays roulette.
-const ROULETTE_BELOW: f32 = 0.001;
+/// Both ways are followed while each still carries a share of the pixel; a branch that carries less than half of that plays
+/// roulette. The first few S are followed further: a lamp that is seen after two reflections inside a ball would be drawn
+/// by chance, and be a bright speck. Behind many balls ways double with each of them.
+fn split_above(bounces: u32) -> f32 {
+    const FEW: u32 = 6;
+    if bounces < FEW { 0.002 } else { 0.02 }
+}
 
 /// More S than this end the walk: between two mirrors of reflectance 0.95 it then carries 3 %.
 const MAX_BOUNCES: u32 = 64;
@@ -272,7 +274,7 @@ impl<'a> EyeWalk<'a> {
             (Some(a), Some(b)) => (a, b),
         };
         let weight = |o: &Outcome| (branch.throughput * o.fraction).max_element();
-        if branch.scattered.is_none() && weight(&a).min(weight(&b)) >= SPLIT_ABOVE {
+        if branch.scattered.is_none() && weight(&a).min(weight(&b)) >= split_above(branch.bounces) {
             self.push(branch, arrival, &b, 1.0, branch.main);
             self.push(branch, arrival, &a, 1.0, false);
             return;
@@ -294,8 +296,9 @@ impl<'a> EyeWalk<'a> {
     ) {
         let mut throughput = branch.throughput * outcome.fraction * (outcome.radiance_scale / probability);
         let strength = throughput.max_element();
-        if strength < ROULETTE_BELOW {
-            let survival = strength / ROULETTE_BELOW;
+        let roulette_below = 0.5 * split_above(branch.bounces);
+        if strength < roulette_below {
+            let survival = strength / roulette_below;
             let dimension = event_dimension(FIRST_EVENT_DIMENSION, branch.bounces) + 1;
             if self.sample.branch(branch.key).get(dimension) >= survival {
                 return;
