@@ -139,10 +139,7 @@ fn trace_pixel(
     (x, y): (u32, u32),
     index: usize,
 ) -> PixelSums {
-    let gathers = context.gathers
-        && context.photons.is_some()
-        && context.plan.caustics == Some(Caustics::Photons)
-        && context.plan.classes.contains(PathClass::Caustic);
+    let gathers = gathers(context);
     let footprint = context.footprints.get(index);
     let lookups = match footprint {
         _ if !gathers => Lookups::Nowhere,
@@ -151,7 +148,7 @@ fn trace_pixel(
         Some(_) => Lookups::OffFootprint,
     };
     let gathering = lookups_of_round(context, lookups, index);
-    let PixelSums { samples: sampled, paths: gone, .. } = context.film.pixels()[index];
+    let before = &context.film.pixels()[index];
     let goes_on = context.plan.classes.contains(PathClass::Indirect);
     let paths = if goes_on { context.effort.paths(index) } else { 0 };
     let count = context.effort.samples(index).max(gathering).max(paths);
@@ -181,23 +178,18 @@ fn trace_pixel(
         let seed = pixel_seed(context.scene.render.seed, x, y, half);
         // Those that look photons up lie anywhere in the round: a fixed place would be a fixed part of the sequence, and
         // so of the pixel.
-        let turn = (hash(seed, u64::from(sampled)) % u64::from(count.max(1))) as u32;
+        let turn = (hash(seed, u64::from(before.samples)) % u64::from(count.max(1))) as u32;
         for i in 0..count {
-            // Paths have a sequence of their own: one of every few points of another would not be evenly spread.
-            let sample = match i.checked_sub(paths) {
-                None => SamplePoint::new(hash(seed, PATHS), gone.wrapping_add(i)),
-                Some(other) => SamplePoint::new(seed, (sampled - gone).wrapping_add(other)),
-            };
+            let sample = next_sample(seed, before, (i, paths));
             walk.goes_on = i < paths;
             let raster = Vec2::new(x as f32, y as f32) + sample.get_2d(0);
             let lookups = if (i + turn) % count < gathering { lookups } else { Lookups::Nowhere };
             let view = footprint.map(|f| f.view);
+            walk.start(half as usize, sample, lookups, view);
             if context.plan.moves {
                 let photons = context.photons.filter(|_| lookups != Lookups::Nowhere);
-                walk.start(half as usize, sample, lookups, view);
                 walk.trace_moving(raster, photons.map(|p| p.times[half as usize]), &mut sums);
             } else {
-                walk.start(half as usize, sample, lookups, view);
                 walk.trace(raster, &mut sums);
             }
         }
@@ -208,6 +200,23 @@ fn trace_pixel(
         walk.layers.average_lookups(share);
     }
     sums
+}
+
+/// Whether caustics are gathered from photons.
+fn gathers(context: &EyeContext<'_>) -> bool {
+    context.gathers
+        && context.photons.is_some()
+        && context.plan.caustics == Some(Caustics::Photons)
+        && context.plan.classes.contains(PathClass::Caustic)
+}
+
+/// Sample `i` of a round's, the first of which go on as `paths`, of a pixel that had some before. Paths have a sequence of
+/// their own: one of every few points of another would not be evenly spread.
+fn next_sample(seed: u64, before: &PixelSums, (i, paths): (u32, u32)) -> SamplePoint {
+    match i.checked_sub(paths) {
+        None => SamplePoint::new(hash(seed, PATHS), before.paths.wrapping_add(i)),
+        Some(other) => SamplePoint::new(seed, (before.samples - before.paths).wrapping_add(other)),
+    }
 }
 
 /// Tells the sequence of the samples that go on as paths.
