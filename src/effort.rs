@@ -15,7 +15,7 @@ pub struct Effort {
     pub photon_shift: u32,
     /// Eye samples of each pixel and half; empty means one each.
     pub samples: Vec<u8>,
-    /// Those among them that go on as paths, where these are asked for; empty means one each.
+    /// Those among them that go on as paths; empty means one each, where they are asked for at all.
     pub paths: Vec<u8>,
 }
 
@@ -106,14 +106,15 @@ impl Effort {
             wanted.pixels.iter().enumerate().map(dithered).collect()
         };
         let samples = more(&Wanted::samples(measured), SAMPLES);
-        Self { photon_shift: 0, samples, paths: more(&Wanted::paths(measured), PATHS) }
+        let paths = Wanted::paths(measured).map_or_else(Vec::new, |wanted| more(&wanted, PATHS));
+        Self { photon_shift: 0, samples, paths }
     }
 
     /// Decides the next rounds' effort. `key` decides the rounding of fractions of a sample.
     #[must_use]
     pub fn decide(measured: &Measured<'_>, most_shift: u32, key: u64) -> Self {
         let (samples, paths) = (Wanted::samples(measured), Wanted::paths(measured));
-        let mean = samples.mean.max(paths.mean);
+        let mean = paths.as_ref().map_or(0.0, |paths| paths.mean).max(samples.mean);
         let photons: f64 = measured.errors.iter().map(|e| f64::from(e.photons)).sum();
         let per_block = photons as f32 * measured.photon_weight / (measured.rays_per_block * PHOTON_OVERHEAD);
         let (photon_shift, scale) = if measured.rays_per_block <= 0.0 || per_block <= 0.0 {
@@ -126,18 +127,20 @@ impl Effort {
             let photon_shift = balanced.clamp(0.0, most_shift) as u32;
             (photon_shift, (1_u32 << photon_shift) as f32 / blocks)
         };
-        let scale = scale.min(measured.most_rays() / (samples.rays() + paths.rays()).max(f32::MIN_POSITIVE));
-        let key_of_paths = hash(key, 1);
+        let rays = samples.rays() + paths.as_ref().map_or(0.0, Wanted::rays);
+        let scale = scale.min(measured.most_rays() / rays.max(f32::MIN_POSITIVE));
+        let scaled = |paths: Wanted| paths.scaled(scale, &measured.paths, hash(key, 1));
         Self {
             photon_shift,
             samples: samples.scaled(scale, &measured.samples, key),
-            paths: paths.scaled(scale, &measured.paths, key_of_paths),
+            paths: paths.map_or_else(Vec::new, scaled),
         }
     }
 }
 
 impl Measured<'_> {
-    /// A round at most doubles what eye samples and paths have cost before: no single one overruns a limit of time by far.
+    /// A round costs at most twice what all eye samples and paths before have cost: no single one overruns a limit of time by
+    /// far.
     fn most_rays(&self) -> f32 {
         let spent = |counts: &[u32], rays: f32| counts.iter().map(|&n| n as f32).sum::<f32>() * rays.max(1.0);
         let paths = spent(&self.paths, self.rays_per_path * PATH_OVERHEAD);
@@ -158,8 +161,12 @@ impl Wanted {
         Self::of(measured, (|e| e.sampled, &measured.samples), measured.rays_per_sample)
     }
 
-    fn paths(measured: &Measured<'_>) -> Self {
-        Self::of(measured, (|e| e.paths, &measured.paths), measured.rays_per_path * PATH_OVERHEAD)
+    /// `None` if no paths are asked for.
+    fn paths(measured: &Measured<'_>) -> Option<Self> {
+        let asked = measured.paths.iter().any(|&n| n > 0);
+        asked.then(|| {
+            Self::of(measured, (|e| e.paths, &measured.paths), measured.rays_per_path * PATH_OVERHEAD)
+        })
     }
 
     fn of(measured: &Measured<'_>, (error, had): (fn(&PixelError) -> f32, &[u32]), rays: f32) -> Self {

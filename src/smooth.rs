@@ -74,9 +74,17 @@ struct Sample {
 /// Decides the widths and filters.
 #[must_use]
 pub fn smooth(film: &Film, footprints: &Footprints) -> Smoothing {
+    // Photons that were connected to the eye, and paths that find the caustics, are left as they are.
+    let looked_up = film.caustics() == Caustics::Photons;
+    let asked = film.pixels().iter().any(|pixel| pixel.paths > 0);
+    if footprints.size().0 == 0 || !(looked_up || asked) {
+        return Smoothing::default();
+    }
+    let segments = segment::segments(footprints);
+    let one = |gathered| smooth_one((film, footprints), &segments, gathered);
     let (photons, indirect) = rayon::join(
-        || smooth_one(film, footprints, Gathered::Photons),
-        || smooth_one(film, footprints, Gathered::Indirect),
+        || looked_up.then(|| one(Gathered::Photons)).flatten(),
+        || asked.then(|| one(Gathered::Indirect)).flatten(),
     );
     Smoothing { photons, indirect }
 }
@@ -107,19 +115,21 @@ pub fn smoothable(footprints: &Footprints) -> Vec<bool> {
     smoothable
 }
 
-fn smooth_one(film: &Film, footprints: &Footprints, gathered: Gathered) -> Option<Smoothed> {
-    if footprints.size().0 == 0 || (gathered == Gathered::Photons && film.caustics() != Caustics::Photons) {
-        return None;
-    }
+/// `None` if there is no light of this kind.
+fn smooth_one(
+    (film, footprints): (&Film, &Footprints),
+    segments: &[Segment],
+    gathered: Gathered,
+) -> Option<Smoothed> {
     let samples = samples((film, footprints), gathered);
     if samples.iter().all(|s| s.irradiance == [Vec3::ZERO; 2]) {
         return None;
     }
     let sum: f32 = film.means().map(|means| mean_channel(means.total())).sum();
-    let mean = sum / samples.len() as f32;
-    let filtered: Vec<(Segment, Ladder)> = lit_segments(footprints, &samples)
+    let floor = 0.1 * sum / samples.len() as f32;
+    let filtered: Vec<(Segment, Ladder)> = lit_segments(segments, &samples)
         .map(|segment| {
-            let ladder = Ladder::climb(&segment, &samples, (gathered, 0.1 * mean));
+            let ladder = Ladder::climb(&segment, &samples, (gathered, floor));
             (segment, ladder)
         })
         .collect();
@@ -152,7 +162,7 @@ pub fn smooth_part(
 ) -> Vec<Vec3> {
     let samples = samples((film, footprints), gathered);
     let mut correction = vec![Vec3::ZERO; samples.len()];
-    let segments: Vec<Segment> = lit_segments(footprints, &samples).collect();
+    let segments: Vec<Segment> = lit_segments(&segment::segments(footprints), &samples).collect();
     for segment in &segments {
         ladder::filter_part(segment, (irradiance, &samples), &smoothed.level, |pixel, smooth| {
             correction[pixel] = samples[pixel].gain * (smooth - irradiance[pixel]);
@@ -163,11 +173,12 @@ pub fn smooth_part(
 
 /// The pieces of surface that are large enough and have light.
 fn lit_segments<'a>(
-    footprints: &Footprints,
+    segments: &'a [Segment],
     samples: &'a [Sample],
 ) -> impl ParallelIterator<Item = Segment> + 'a {
-    segment::segments(footprints)
-        .into_par_iter()
+    segments
+        .par_iter()
+        .filter(|segment| segment.pixels.len() >= LEAST_PIXELS)
         .filter_map(|segment| segment.near(ladder::MOST_REACH, |i| samples[i].irradiance != [Vec3::ZERO; 2]))
         .filter(|segment| segment.pixels.len() >= LEAST_PIXELS)
 }

@@ -147,14 +147,14 @@ fn trace_pixel(
         Some(footprint) if footprint.only_way => Lookups::Nowhere,
         Some(_) => Lookups::OffFootprint,
     };
-    let gathering = lookups_of_round(context, lookups, index);
+    walk.border = gathers && context.footprints.at_border(index);
+    let gathering = lookups_of_round(context.effort, lookups, walk.border);
     let before = &context.film.pixels()[index];
     let goes_on = context.plan.classes.contains(PathClass::Indirect);
     let paths = if goes_on { context.effort.paths(index) } else { 0 };
     let count = context.effort.samples(index).max(gathering).max(paths);
     let mut sums = PixelSums { samples: count, paths, ..PixelSums::default() };
     walk.counts.paths += 2 * u64::from(paths);
-    walk.border = gathers && context.footprints.at_border(index);
     walk.layers.clear();
     for half in 0..2 {
         if let (Some(footprint), Some(photons)) = (footprint, context.photons.filter(|_| gathers)) {
@@ -231,12 +231,10 @@ const MOST_LOOKUPS: u32 = 32;
 /// Samples of a pixel and half that look photons up in a round. Rounds count by their photons: at a border, where one
 /// sample meets another surface than the next, a round of many photons with a single look-up would outweigh all others.
 /// (Elsewhere a second look-up of the same photons tells next to nothing: tried on a lens, moving balls and rough metal.)
-fn lookups_of_round(context: &EyeContext<'_>, lookups: Lookups, index: usize) -> u32 {
+fn lookups_of_round(effort: &Effort, lookups: Lookups, border: bool) -> u32 {
     match lookups {
         Lookups::Nowhere => 0,
-        Lookups::Everywhere if context.footprints.at_border(index) => {
-            (BORDER_LOOKUPS << context.effort.photon_shift).min(MOST_LOOKUPS)
-        }
+        Lookups::Everywhere if border => (BORDER_LOOKUPS << effort.photon_shift).min(MOST_LOOKUPS),
         Lookups::Everywhere | Lookups::OffFootprint => 1,
     }
 }

@@ -68,16 +68,42 @@ pub struct EyeCounts {
 impl EyeCounts {
     /// Adds another's counts.
     pub fn add(&mut self, other: &Self) {
-        self.eye_rays += other.eye_rays;
-        self.shadow_rays += other.shadow_rays;
-        self.lookups += other.lookups;
-        self.short_lookups += other.short_lookups;
-        self.cut += other.cut;
-        self.paths += other.paths;
-        self.path_rays += other.path_rays;
-        self.lens_points += other.lens_points;
-        self.moments += other.moments;
-        self.wavelengths += other.wavelengths;
+        let (mine, theirs) = (self.to_array(), other.to_array());
+        *self = Self::from_array(std::array::from_fn(|i| mine[i] + theirs[i]));
+    }
+
+    /// The counts in a fixed order.
+    pub(crate) fn to_array(self) -> [u64; 10] {
+        [
+            self.eye_rays,
+            self.shadow_rays,
+            self.lookups,
+            self.short_lookups,
+            self.cut,
+            self.paths,
+            self.path_rays,
+            self.lens_points,
+            self.moments,
+            self.wavelengths,
+        ]
+    }
+
+    /// The inverse of [`EyeCounts::to_array`].
+    pub(crate) fn from_array(counts: [u64; 10]) -> Self {
+        let [eye_rays, shadow_rays, lookups, short_lookups, cut, rest @ ..] = counts;
+        let [paths, path_rays, lens_points, moments, wavelengths] = rest;
+        Self {
+            eye_rays,
+            shadow_rays,
+            lookups,
+            short_lookups,
+            cut,
+            paths,
+            path_rays,
+            lens_points,
+            moments,
+            wavelengths,
+        }
     }
 }
 

@@ -31,32 +31,19 @@ impl Render {
             put_f64(&mut out, time.wall);
             put_f64(&mut out, time.cpu);
         }
-        let EyeCounts { eye_rays, shadow_rays, lookups, short_lookups, cut, .. } = self.eye;
-        let EyeCounts { paths, path_rays, lens_points, moments, wavelengths, .. } = self.eye;
-        let windows = self.windows.len() as u64;
-        for count in [
-            eye_rays,
-            shadow_rays,
-            lookups,
-            short_lookups,
-            cut,
-            paths,
-            path_rays,
-            lens_points,
-            moments,
-            wavelengths,
-            windows,
-        ] {
+        for count in self.eye.to_array().into_iter().chain([self.windows.len() as u64]) {
             put_u64(&mut out, count);
         }
         for tally in &self.windows {
             put_tally(&mut out, tally);
         }
-        for count in [self.blocks, self.effort.photon_shift, self.effort.samples.len() as u32] {
+        for count in [self.blocks, self.effort.photon_shift] {
             out.extend(count.to_le_bytes());
         }
-        out.extend(&self.effort.samples);
-        out.extend(&self.effort.paths);
+        for counts in [&self.effort.samples, &self.effort.paths] {
+            out.extend((counts.len() as u32).to_le_bytes());
+            out.extend(counts);
+        }
         // A non-negative float's bits plus one: zero means none.
         let error = self.error.map_or(0, |e| e.to_bits() + 1);
         out.extend(error.to_le_bytes());
@@ -82,18 +69,11 @@ impl Render {
         for time in [&mut self.pass1, &mut self.pass2] {
             *time = PassTime { wall: take_f64(&mut bytes)?, cpu: take_f64(&mut bytes)? };
         }
-        self.eye = EyeCounts {
-            eye_rays: take_u64(&mut bytes)?,
-            shadow_rays: take_u64(&mut bytes)?,
-            lookups: take_u64(&mut bytes)?,
-            short_lookups: take_u64(&mut bytes)?,
-            cut: take_u64(&mut bytes)?,
-            paths: take_u64(&mut bytes)?,
-            path_rays: take_u64(&mut bytes)?,
-            lens_points: take_u64(&mut bytes)?,
-            moments: take_u64(&mut bytes)?,
-            wavelengths: take_u64(&mut bytes)?,
-        };
+        let mut counts = EyeCounts::default().to_array();
+        for count in &mut counts {
+            *count = take_u64(&mut bytes)?;
+        }
+        self.eye = EyeCounts::from_array(counts);
         if take_u64(&mut bytes)? != self.windows.len() as u64 {
             return None;
         }
@@ -102,8 +82,8 @@ impl Render {
         }
         self.blocks = take_u32(&mut bytes)?;
         self.effort.photon_shift = take_u32(&mut bytes)?.min(self.plan.most_photon_shift());
-        let pixels = take_u32(&mut bytes)? as usize;
         for counts in [&mut self.effort.samples, &mut self.effort.paths] {
+            let pixels = take_u32(&mut bytes)? as usize;
             let (values, rest) = bytes.split_at_checked(pixels)?;
             *counts = values.to_vec();
             bytes = rest;

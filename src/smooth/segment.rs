@@ -24,7 +24,7 @@ impl Segment {
 
     /// The part of the segment in the box around its lit pixels, `margin` pixels wider on each side; `None` if
     /// none is lit.
-    pub(super) fn near(self, margin: usize, lit: impl Fn(usize) -> bool) -> Option<Self> {
+    pub(super) fn near(&self, margin: usize, lit: impl Fn(usize) -> bool) -> Option<Self> {
         let stride = self.stride;
         let at = |pixel: u32| (pixel as usize % stride, pixel as usize / stride);
         let lit: Vec<u32> = self.pixels.iter().copied().filter(|&i| lit(i as usize)).collect();
@@ -38,7 +38,7 @@ impl Segment {
             let (x, y) = at(i);
             (low.0..high.0).contains(&x) && (low.1..high.1).contains(&y)
         };
-        Some(Self::of(self.pixels.into_iter().filter(inside).collect(), stride))
+        Some(Self::of(self.pixels.iter().copied().filter(inside).collect(), stride))
     }
 
     fn of(mut pixels: Vec<u32>, stride: usize) -> Self {

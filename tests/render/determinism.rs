@@ -73,6 +73,32 @@ fn a_resumed_render_gives_the_same_bytes_as_an_undisturbed_one() {
     assert_eq!(resumed.stats().windows, undisturbed.stats().windows);
 }
 
+/// Paths are counted apart, and the first round's are few: also a checkpoint in the middle of it goes on as it would have.
+#[test]
+fn a_complete_render_goes_on_from_any_checkpoint() {
+    let mut value = value();
+    value["render"]["paths"] = serde_json::json!("complete");
+    let render = || {
+        let scene = compile(&value);
+        let plan = Plan::new(&scene);
+        Render::new(Arc::new(scene), plan)
+    };
+    let mut undisturbed = render();
+    (0..3).for_each(|_| _ = undisturbed.run_round(&Control::new()).unwrap());
+    for rounds in 0..3 {
+        let mut first = render();
+        (0..rounds).for_each(|_| _ = first.run_round(&Control::new()).unwrap());
+        let cancelled = Control::new();
+        cancelled.cancel();
+        assert!(first.run_round(&cancelled).is_err());
+        let scene = compile(&value);
+        let plan = Plan::new(&scene);
+        let mut resumed = Render::resume(Arc::new(scene), plan, &first.checkpoint()).unwrap();
+        (rounds..3).for_each(|_| _ = resumed.run_round(&Control::new()).unwrap());
+        assert!(bits(&resumed) == bits(&undisturbed), "{rounds}");
+    }
+}
+
 /// A crash between the last round and its picture: the picture is made of the checkpoint alone.
 #[test]
 fn a_picture_of_a_checkpoint_is_the_picture_without_one() {

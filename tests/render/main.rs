@@ -25,6 +25,7 @@ mod lights;
 mod many_lights;
 mod materials;
 mod motion;
+mod moving_lamps;
 mod optics;
 mod paths;
 mod photon_map;
