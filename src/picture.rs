@@ -140,32 +140,35 @@ impl<'a> Picture<'a> {
         let darker = value - (sampled + paths + photons).abs();
         let photons = photons * photons + Vec3::splat(smoothed.unwrap_or(0.0));
         let paths = paths * paths + Vec3::splat(bounced.unwrap_or(0.0));
-        let sampled = sampled * sampled;
-        let own = value * value + floor * floor;
         let radiance = darker.max(value.min(around)).max(Vec3::ZERO);
+        let relative = |squares: Vec3| mean_channel(squares / (radiance * radiance + floor * floor));
         PixelError {
-            sampled: mean_channel(sampled / own),
-            paths: mean_channel(paths / own),
-            photons: mean_channel(photons / own),
-            relative: mean_channel((sampled + paths + photons) / (radiance * radiance + floor * floor)),
+            sampled: relative(sampled * sampled),
+            paths: relative(paths),
+            photons: relative(photons),
         }
     }
 }
 
-/// Estimated squared error of a pixel, relative to a squared radiance; mean over channels.
+/// Estimated squared error of a pixel by what brings it, relative to a squared radiance that does not hold the error; mean
+/// over channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelError {
-    /// Of what eye samples bring, emitted and direct light, relative to the pixel's own radiance.
+    /// Of what eye samples bring, emitted and direct light.
     pub sampled: f32,
-    /// Of what paths bring, indirect light, relative to the same.
+    /// Of what paths bring, indirect light.
     pub paths: f32,
-    /// Of what photons bring, relative to the same.
+    /// Of what photons bring.
     pub photons: f32,
-    /// Of all, relative to a radiance that does not hold the error.
-    pub relative: f32,
 }
 
 impl PixelError {
+    /// Of all.
+    #[must_use]
+    pub fn total(&self) -> f32 {
+        self.sampled + self.paths + self.photons
+    }
+
     /// Root of the upper end of the mean's one-sided 95 % range: where few pixels hold most of the error, the estimate of
     /// it is itself uncertain. Pixels count as independent, which smoothed ones are not quite. A pixel's error is a squared normal number, so that its variance is 2/3 of the
     /// mean of its square.
@@ -173,8 +176,8 @@ impl PixelError {
     pub fn bound(errors: &[Self]) -> f32 {
         /// Standard deviations above the mean that 5 % of a normal distribution exceed.
         const ONE_SIDED_95: f64 = 1.645;
-        let sum: f64 = errors.iter().map(|e| f64::from(e.relative)).sum();
-        let squares: f64 = errors.iter().map(|e| f64::from(e.relative).powi(2)).sum();
+        let sum: f64 = errors.iter().map(|e| f64::from(e.total())).sum();
+        let squares: f64 = errors.iter().map(|e| f64::from(e.total()).powi(2)).sum();
         ((sum + ONE_SIDED_95 * (squares * 2.0 / 3.0).sqrt()) / errors.len().max(1) as f64).sqrt() as f32
     }
 }

@@ -330,7 +330,7 @@ impl RunningRender {
     /// The estimated error of each pixel, as colours.
     fn error_map(&self, picture: &nephroid::picture::Picture<'_>) -> Result<Vec<u8>, String> {
         let errors = picture.errors();
-        let pixels = errors.iter().map(|error| error_map::color(error.relative.sqrt())).collect();
+        let pixels = errors.iter().map(|error| error_map::color(error.total().sqrt())).collect();
         let ImageSettings { width, height, .. } = self.settings;
         let settings = ImageSettings { width, height, exposure: 0.0, tone: Tone::Linear };
         encode_png(&LinearImage { width, height, pixels }, &settings).map_err(|error| error.to_string())

@@ -165,10 +165,11 @@ impl ChartArguments {
 
     /// The reference of an earlier run of the same scene and budget, or a new one.
     fn reference(&self, subject: &Subject<'_>, task: Task, budget: Budget) -> Result<Reference, Failure> {
-        let file = |end: &str| self.output.join(format!("{}-{}-reference.{end}", subject.name, task.name()));
+        let file = |end: &str| self.output.join(format!("{}-{}-reference{end}", subject.name, task.name()));
         let key = json!({ "scene": format!("{:016x}", subject.hash()), "budget": budget.reference,
                           "version": env!("CARGO_PKG_VERSION") });
-        if let Some(mut stored) = stored(&file("npy"), &file("json"), &key) {
+        let halves = ["-a.npy", "-b.npy"].map(file);
+        if let Some(mut stored) = stored(&halves, &file(".json"), &key) {
             if task == Task::Complete {
                 stored.mask = without_lamps(subject).map_err(Failure::Lab)?;
             }
@@ -176,21 +177,23 @@ impl ChartArguments {
         }
         say(format!("{}, {}: reference", subject.name, task.name()));
         let reference = measure_reference(subject, task, budget).map_err(Failure::Lab)?;
-        save(&file("npy"), &image_io::encode_npy(&reference.image))?;
+        for (half, path) in reference.halves.iter().zip(&halves) {
+            save(path, &image_io::encode_npy(half))?;
+        }
         let mut about = reference_json(&reference);
         about["made_for"] = key;
-        save(&file("json"), format!("{about:#}\n").as_bytes())?;
+        save(&file(".json"), format!("{about:#}\n").as_bytes())?;
         Ok(reference)
     }
 }
 
-fn stored(npy: &Path, about: &Path, key: &Value) -> Option<Reference> {
+fn stored(halves: &[PathBuf; 2], about: &Path, key: &Value) -> Option<Reference> {
     let about: Value = serde_json::from_slice(&std::fs::read(about).ok()?).ok()?;
     if about["made_for"] != *key {
         return None;
     }
-    let image = image_io::decode(&std::fs::read(npy).ok()?, ImageFormat::Npy).ok()?;
-    table::reference_from(&about, image)
+    let read = |npy: &PathBuf| image_io::decode(&std::fs::read(npy).ok()?, ImageFormat::Npy).ok();
+    table::reference_from(&about, [read(&halves[0])?, read(&halves[1])?])
 }
 
 /// A scene's text and what it refers to.

@@ -67,9 +67,7 @@ fn looks(
     let mut looks = Vec::new();
     loop {
         timed.run_to_milestone()?;
-        let squared = reference.judge(&timed.render.image())?.relmse;
-        // The reference's own error is independent of the render's, so that squares subtract.
-        let truth = (squared - reference.relative_error.powi(2)).max(0.0).sqrt();
+        let truth = reference.judge(&timed.render.image())?.relative;
         let estimate = timed.render.error_estimate().map_or(f64::INFINITY, f64::from);
         let rounds = timed.render.rounds();
         looks.push(Look { rounds, cpu: timed.cpu, estimate, truth });

@@ -8,6 +8,7 @@
 pub mod axis;
 pub mod fit;
 pub mod honesty;
+pub mod judge;
 pub mod methods;
 pub mod page;
 pub mod peers;
@@ -22,6 +23,7 @@ pub mod table;
 mod reference;
 
 pub use honesty::{Honesty, honesty};
+pub use judge::Judgement;
 pub use methods::Method;
 pub use peers::{PeerRun, Shot, peer_curve};
 pub use reference::{Reference, Rival, measure_reference, without_lamps};

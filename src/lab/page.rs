@@ -56,12 +56,13 @@ fn growth(html: &mut String, scalings: &[Scaling]) {
 fn reference_words(html: &mut String, reference: &Reference) {
     let _ = write!(
         html,
-        "<p>Reference: {}, {} rounds in {:.0} CPU seconds; its own standard error is {} of the mean. A line ends where \
-         its error would fall below three times that.",
+        "<p>Reference: {}, {} rounds in {:.0} CPU seconds; its own standard error is {} of the mean. Known by two \
+         independent halves it tells errors down to about {}; a line ends where it tells no more.",
         reference.estimator,
         reference.rounds,
         reference.cpu,
-        percent(reference.error)
+        percent(reference.error),
+        percent(reference.floor())
     );
     if reference.mask.is_some() {
         html.push_str(" Pixels that show a lamp, straight, in a mirror or through glass, are left out.");
@@ -169,8 +170,8 @@ fn honesty(html: &mut String, scene: &SceneResults) {
     let Some((rows, own)) = &scene.honesty else { return };
     let _ = write!(
         html,
-        "<h3>Renders that stop by their own estimate</h3>\n<p>Small pictures, many seeds. In this measure the reference's own error is {}, which \
-         is taken off in squares; rows that ask for less than three times as much are not to be trusted.</p>",
+        "<h3>Renders that stop by their own estimate</h3>\n<p>Small pictures, many seeds. In this measure the reference's own error is {}, \
+         and is taken off by its two halves.</p>",
         percent(*own)
     );
     html.push_str(

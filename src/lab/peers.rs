@@ -1,8 +1,7 @@
 //! Other renderers on the same chart: their pictures at growing times, compared with the same reference; or lines that
 //! were measured before, marked as such.
 
-use super::run::OVER_REFERENCE;
-use super::{Curve, End, LabError, Method, Origin, Point, Reference};
+use super::{Curve, End, Judgement, LabError, Method, Origin, Point, Reference};
 use crate::image_io::LinearImage;
 use serde_json::json;
 
@@ -31,8 +30,8 @@ pub struct PeerRun {
 pub fn peer_curve(run: PeerRun, reference: &Reference, equal_time: f64) -> Result<Curve, LabError> {
     let (mut points, mut picture, mut end) = (Vec::new(), None, End::Measured);
     for (index, Shot { cpu, image }) in run.shots.into_iter().enumerate() {
-        let error = reference.judge(&image)?.rel_rmse;
-        if error < OVER_REFERENCE * reference.error {
+        let Judgement { error, told, .. } = reference.judge(&image)?;
+        if !told {
             end = End::Reference;
             break;
         }

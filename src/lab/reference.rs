@@ -3,7 +3,7 @@
 use super::methods::all_can_be_met;
 use super::run::Timed;
 use super::{Budget, LabError, Subject, Task};
-use crate::compare::{CompareError, Comparison, compare};
+use crate::compare::{Comparison, compare};
 use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::plan::Plan;
@@ -22,7 +22,9 @@ const TRIAL: f64 = 0.125;
 /// A picture to measure errors against.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
-    /// Mean of the two halves, nothing smoothed.
+    /// Two estimates that share no random number, nothing smoothed.
+    pub halves: [LinearImage; 2],
+    /// Their mean.
     pub image: LinearImage,
     /// Its standard error: root mean square of half the halves' difference, over the mean.
     pub error: f64,
@@ -53,16 +55,6 @@ pub struct Rival {
     pub difference: f64,
     /// Its mean over that of the reference.
     pub mean_ratio: f64,
-}
-
-impl Reference {
-    /// How a picture differs from it.
-    ///
-    /// # Errors
-    /// If it has another size, or is not finite.
-    pub fn judge(&self, image: &LinearImage) -> Result<Comparison, CompareError> {
-        compare(image, &self.image, self.mask.as_deref())
-    }
 }
 
 /// The pixels of a complete picture that are compared with other renderers: those that show no lamp, neither straight nor
@@ -147,13 +139,12 @@ fn run(timed: &mut Timed, seconds: f64) -> Result<(), LabError> {
 }
 
 fn summary(timed: &Timed, mask: Option<&[bool]>) -> Result<Reference, LabError> {
-    let [a, b] = timed.render.raw_halves();
-    let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
-    let pixels = a.pixels.iter().zip(&b.pixels).map(mean).collect();
-    let image = LinearImage { width: a.width, height: a.height, pixels };
+    let halves = timed.render.raw_halves();
+    let image = mean_of(&halves);
     // The mean differs from a half by half the halves' difference.
-    let Comparison { rel_rmse, relmse, .. } = compare(&a, &image, mask)?;
+    let Comparison { rel_rmse, relmse, .. } = compare(&halves[0], &image, mask)?;
     Ok(Reference {
+        halves,
         image,
         error: rel_rmse,
         relative_error: relmse.sqrt(),
@@ -163,4 +154,11 @@ fn summary(timed: &Timed, mask: Option<&[bool]>) -> Result<Reference, LabError> 
         rival: None,
         mask: mask.map(<[bool]>::to_vec),
     })
+}
+
+/// The mean of two pictures of one size.
+pub(super) fn mean_of([a, b]: &[LinearImage; 2]) -> LinearImage {
+    let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
+    let pixels = a.pixels.iter().zip(&b.pixels).map(mean).collect();
+    LinearImage { width: a.width, height: a.height, pixels }
 }

@@ -1,7 +1,7 @@
 //! One method over growing budgets: one render, looked at between its rounds while the clock stands.
 
 use super::fit::{slope, tail, time_to_reach};
-use super::{LabError, Method, Reference, Subject};
+use super::{Judgement, LabError, Method, Reference, Subject};
 use crate::image_io::LinearImage;
 use crate::plan::Plan;
 use crate::render::{Control, Render, RenderError, is_milestone};
@@ -11,9 +11,6 @@ use std::sync::Arc;
 
 /// Seed of the methods' renders; that of the reference is another.
 const SEED: u64 = 1;
-
-/// An error is charted if it is this many times that of the reference.
-pub const OVER_REFERENCE: f64 = 3.0;
 
 /// How long is rendered, CPU seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +45,7 @@ pub struct Point {
 pub enum End {
     /// The budget is used up.
     Time,
-    /// Its error came too near to that of the reference to be told.
+    /// Its error was too small to be told by the reference.
     Reference,
     /// There are no more pictures of another renderer.
     Measured,
@@ -145,8 +142,8 @@ pub fn run_method(
             break End::Failed(error);
         }
         let image = timed.render.image();
-        let error = reference.judge(&image)?.rel_rmse;
-        if error < OVER_REFERENCE * reference.error {
+        let Judgement { error, told, .. } = reference.judge(&image)?;
+        if !told {
             break End::Reference;
         }
         let point = Point { rounds: timed.render.rounds(), cpu: timed.cpu, error };

@@ -1,7 +1,6 @@
 //! A chart as SVG: both axes logarithmic, so that power laws are straight.
 
 use super::axis::{LogAxis, escaped, plain};
-use super::run::OVER_REFERENCE;
 use super::{Chart, Curve, Origin};
 use std::fmt::Write;
 
@@ -33,7 +32,7 @@ pub fn draw(chart: &Chart) -> String {
         text(&mut svg, (BOX[0], 100.0), "start", "The reference tells no error.");
     } else {
         let x = LogAxis::around(all().map(|p| p.cpu).collect::<Vec<_>>().into_iter(), BOX[0], BOX[1]);
-        let floor = OVER_REFERENCE * chart.reference.error;
+        let floor = chart.reference.floor();
         let errors: Vec<f64> = all().map(|p| p.error).chain([floor]).collect();
         let y = LogAxis::around(errors.into_iter(), BOX[3], BOX[2]);
         axes(&mut svg, &x, &y);
@@ -81,7 +80,7 @@ fn floor_line(svg: &mut String, y: f64) {
         svg,
         "<line x1=\"{left}\" y1=\"{y:.1}\" x2=\"{right}\" y2=\"{y:.1}\" stroke=\"{INK}\" stroke-dasharray=\"2 5\"/>"
     );
-    text(svg, (right + 16.0, y + 4.0), "start", "three times the reference's own error");
+    text(svg, (right + 16.0, y + 4.0), "start", "the least that the reference tells");
 }
 
 /// The rate of independent samples, from the upper left.

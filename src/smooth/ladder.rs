@@ -87,6 +87,12 @@ struct Filtered {
     share: Vec<Vec3>,
 }
 
+impl Filtered {
+    fn mean(&self, i: usize) -> Vec3 {
+        0.5 * (self.halves[0][i] + self.halves[1][i])
+    }
+}
+
 /// Sums over rectangles of a plane in constant time.
 struct Sums {
     width: usize,
@@ -124,13 +130,22 @@ impl Ladder {
         }
         let levels: Vec<Filtered> =
             widths(gathered).par_iter().map(|level| filter(*level, &raw, &mask, segment.size)).collect();
-        let weights = weights(segment, samples, &levels[3], floor);
-        let costs = Costs { levels: &levels, weights: &weights, mask: &mask };
+        // What to choose by is known before the choice from a middling width.
+        let even = weights(segment, samples, |i| levels[3].mean(i), floor);
+        let costs = Costs { levels: &levels, weights: &even, mask: &mask };
         let sums: Vec<Cost> =
             (0..levels.len()).into_par_iter().map(|level| costs.sums(level, segment.size)).collect();
         let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
-        let mut choices = choose(&levels, (&sums, &counts, windows(gathered)), &weights);
-        estimate(&mut choices, &costs, &counts);
+        let mut choices = choose(&levels, (&sums, &counts, windows(gathered)), &even);
+        // Errors are relative to what was chosen: beside something bright a middling width holds its light, of which a part is
+        // many times the darkness there. Where nothing is smoothed a bright sample would hide its own error: it counts for no
+        // more than with its neighbours.
+        let chosen = |i: usize| {
+            let level = usize::from(choices[i].level);
+            levels[level].mean(i).min(levels[level.max(1)].mean(i))
+        };
+        let weights = weights(segment, samples, chosen, floor);
+        estimate(&mut choices, &Costs { weights: &weights, ..costs }, &counts);
         Self { choices }
     }
 
@@ -165,15 +180,19 @@ pub(super) fn filter_part(
     }
 }
 
-/// One over the squared radiance that an error of irradiance is relative to, from a smoothed picture; 0
+/// One over the squared radiance that an error of irradiance is relative to, from smoothed irradiance; 0
 /// outside the segment.
-fn weights(segment: &Segment, samples: &[Sample], smooth: &Filtered, floor: f32) -> Vec<f32> {
+fn weights(
+    segment: &Segment,
+    samples: &[Sample],
+    irradiance: impl Fn(usize) -> Vec3,
+    floor: f32,
+) -> Vec<f32> {
     let mut weights = vec![0.0; segment.size.0 * segment.size.1];
     for &pixel in &segment.pixels {
         let local = segment.local(pixel);
         let sample = &samples[pixel as usize];
-        let irradiance = 0.5 * (smooth.halves[0][local] + smooth.halves[1][local]);
-        let radiance = mean_channel(sample.rest + sample.gain * irradiance) + floor;
+        let radiance = mean_channel(sample.rest + sample.gain * irradiance(local)) + floor;
         let gain = mean_channel(sample.gain);
         weights[local] = if radiance > 0.0 { (gain / radiance).powi(2) } else { 0.0 };
     }
@@ -231,8 +250,7 @@ fn choose(
                     // Where nothing is known, the next width that reaches something.
                     let reaches = |&level: &usize| levels[level].share[i].x > 0.0;
                     let level = (level..levels.len()).find(reaches).unwrap_or(level);
-                    let halves = &levels[level].halves;
-                    let irradiance = 0.5 * (halves[0][i] + halves[1][i]);
+                    let irradiance = levels[level].mean(i);
                     choices[i - rows.start * width] =
                         Choice { irradiance, squared_error: 0.0, level: level as u8 };
                 }
