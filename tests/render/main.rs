@@ -4,6 +4,7 @@
 
 mod bad_assets;
 mod camera;
+mod casters;
 mod caustics;
 mod checks;
 mod degenerate;
@@ -30,8 +31,11 @@ mod optics;
 mod paths;
 mod photon_map;
 mod picture;
+mod pixelwise;
 mod plan;
+mod reach;
 mod rivals;
+mod scales;
 mod scattering;
 mod scene_file;
 mod schema;

@@ -50,14 +50,31 @@ pub(crate) fn render(value: &Value, seed: u64, rounds: u32, log2_photons: u32) -
 /// The same of a compiled scene.
 pub(crate) fn render_scene(mut scene: Scene, seed: u64, rounds: u32, log2_photons: u32) -> Render {
     scene.render.seed = seed;
-    let mut plan = Plan::new(&scene);
-    plan.photons.iter_mut().for_each(|budget| budget.log2_block = log2_photons);
-    let mut render = Render::new(Arc::new(scene), plan);
+    render_shared(&Arc::new(scene), rounds, Some(log2_photons))
+}
+
+/// The same of a scene whose seed is set, or with the plan's own number of photons.
+pub(crate) fn render_shared(scene: &Arc<Scene>, rounds: u32, log2_photons: Option<u32>) -> Render {
+    let mut plan = Plan::new(scene);
+    for budget in &mut plan.photons {
+        budget.log2_block = log2_photons.unwrap_or(budget.log2_block);
+    }
+    let mut render = Render::new(Arc::clone(scene), plan);
     let control = Control::new();
     for _ in 0..rounds {
         render.run_round(&control).unwrap();
     }
     render
+}
+
+/// Does something with a scene under each of `count` seeds: a large one is read once.
+pub(crate) fn with_seeds(mut scene: Scene, count: u64, mut each: impl FnMut(&Arc<Scene>)) {
+    for seed in 1..=count {
+        scene.render.seed = seed;
+        let shared = Arc::new(scene);
+        each(&shared);
+        scene = Arc::into_inner(shared).expect("the render is done");
+    }
 }
 
 /// Mean irradiance of a floor of albedo 1/2 over the picture's green channel, from one class of paths.
@@ -78,14 +95,47 @@ pub(crate) struct Estimate {
 }
 
 pub(crate) fn over_seeds(mut value: impl FnMut(u64) -> f64) -> Estimate {
-    let values: Vec<f64> = (0..SEEDS).map(|seed| value(seed + 1)).collect();
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    Estimate { mean, standard_error: (variance / n).sqrt() }
+    Estimate::of(&(0..SEEDS).map(|seed| value(seed + 1)).collect::<Vec<_>>())
+}
+
+/// Means over squares of `side` pixels, row by row, each channel by itself.
+pub(crate) fn block_means(image: &LinearImage, side: usize) -> Vec<f64> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let across = width / side;
+    assert!(width.is_multiple_of(side) && height.is_multiple_of(side));
+    let mut sums = vec![0.0; 3 * across * (height / side)];
+    for (i, pixel) in image.pixels.iter().enumerate() {
+        let block = i / width / side * across + i % width / side;
+        (0..3).for_each(|c| sums[3 * block + c] += f64::from(pixel[c]));
+    }
+    sums.iter().map(|sum| sum / (side * side) as f64).collect()
+}
+
+/// For each of some values its mean over repetitions, of which each gives all values.
+pub(crate) fn estimates(repetitions: &[Vec<f64>]) -> Vec<Estimate> {
+    let of = |i: usize| Estimate::of(&repetitions.iter().map(|values| values[i]).collect::<Vec<_>>());
+    (0..repetitions[0].len()).map(of).collect()
 }
 
 impl Estimate {
+    /// Of independent values.
+    pub(crate) fn of(values: &[f64]) -> Self {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        Self { mean, standard_error: (variance / n).sqrt() }
+    }
+
+    /// The same with no less variance than this.
+    pub(crate) fn at_least(self, variance: f64) -> Self {
+        Self { standard_error: self.standard_error.max(variance.sqrt()), ..self }
+    }
+
+    /// How many standard errors of both it differs from another. What is below `least` is not told apart.
+    pub(crate) fn distance(self, other: Self, least: f64) -> f64 {
+        (self.mean - other.mean) / self.standard_error.hypot(other.standard_error).hypot(least)
+    }
+
     /// Fails unless the mean is `expected` up to noise and a relative `bias` that the caller accounts for.
     /// Also fails where the noise is so large that a relative error of 5 % would pass.
     pub(crate) fn assert_is(self, expected: f64, bias: f64) {
