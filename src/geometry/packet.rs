@@ -193,7 +193,9 @@ impl Packet {
 
     #[inline]
     pub(super) fn triangle(&self, lane: usize) -> Triangle {
-        Triangle(std::array::from_fn(|k| Vec3::from(self.corners[k].map(|column| column[lane]))))
+        // By reference: moved, the columns are copied whole.
+        let corner = |[x, y, z]: &[Column; 3]| Vec3::new(x[lane], y[lane], z[lane]);
+        Triangle([corner(&self.corners[0]), corner(&self.corners[1]), corner(&self.corners[2])])
     }
 
     /// Finds the nearest hit among its triangles; `index` is its own place.
