@@ -40,7 +40,9 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     match std::fs::read_to_string(STORED) {
-        Ok(text) => compare(&serde_json::from_str(&text).expect("the baseline is as --save writes it"), &found),
+        Ok(text) => {
+            compare(&serde_json::from_str(&text).expect("the baseline is as --save writes it"), &found)
+        }
         Err(_) => println!("baseline: no {STORED}; `cargo bench --bench baseline -- --save` makes it"),
     }
     ExitCode::SUCCESS
@@ -97,7 +99,8 @@ fn measured(folder: &Path) -> Option<(String, f64)> {
 
 fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = text.lines().find_map(|line| Some(line.strip_prefix("model name")?.split_once(": ")?.1.trim()));
+    let model =
+        text.lines().find_map(|line| Some(line.strip_prefix("model name")?.split_once(": ")?.1.trim()));
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     format!("{}, {cores} cores", model.unwrap_or(std::env::consts::ARCH))
 }

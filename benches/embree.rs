@@ -6,11 +6,13 @@
 
 #[path = "common/meshes.rs"]
 mod meshes;
+#[path = "common/ray_sets.rs"]
+mod ray_sets;
 
 use cpu_time::ThreadTime;
-use meshes::{RaySet, SIZES, ball, terrain};
 use nephroid::geometry::{Geometry, GeometryBuilder, MeshData, Ray};
 use nephroid::scene::ObjectId;
+use ray_sets::{RaySet, SIZES};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{ChildStdin, ChildStdout, Command, Stdio};
@@ -39,8 +41,9 @@ fn main() {
     println!("|---|---|---|---|---|---|---|---|");
     let mut ratios = [Vec::new(), Vec::new()];
     for (size, cells) in SIZES.iter().filter(|(size, _)| !quick || *size != "1M") {
-        compare(&format!("terrain{size}"), &terrain(*cells), &mut ratios);
-        compare(&format!("ball{size}"), &ball(*cells), &mut ratios);
+        for (name, mesh) in meshes::both(*cells) {
+            compare(&format!("{name}{size}"), &mesh, &mut ratios);
+        }
     }
     for (name, ratios) in ["Embree", "Embree robust"].iter().zip(ratios).filter(|(_, r)| !r.is_empty()) {
         let mean = (ratios.iter().map(|r: &f64| r.ln()).sum::<f64>() / ratios.len() as f64).exp();

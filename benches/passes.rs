@@ -44,10 +44,9 @@ fn planned(name: &str) -> (Scene, Plan) {
 /// From a mesh to the structure that rays meet, per triangle.
 fn bench_tree(criterion: &mut CpuCriterion) {
     let mut group = criterion.benchmark_group("tree");
-    for (size, cells) in [("10k", 70), ("100k", 223)] {
-        let mesh = meshes::terrain(cells);
+    for (name, mesh) in meshes::both(223) {
         group.throughput(Throughput::Elements(mesh.triangles.len() as u64));
-        group.bench_function(format!("terrain{size}"), |b| {
+        group.bench_function(format!("{name}100k"), |b| {
             b.iter(|| {
                 let mut builder = GeometryBuilder::default();
                 builder.mesh(ObjectId(0), black_box(&mesh));

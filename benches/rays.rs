@@ -7,11 +7,12 @@
 mod cpu_time;
 #[path = "common/meshes.rs"]
 mod meshes;
+#[path = "common/ray_sets.rs"]
+mod ray_sets;
 
 use cpu_time::{CpuCriterion, criterion};
 use criterion::Throughput;
 use glam::{Vec3, Vec3A};
-use meshes::{RaySet, SIZES, ball, terrain};
 use nephroid::geometry::{GeometryBuilder, MeshData, Ray, Structure};
 use nephroid::sampling::{SamplePoint, uniform_sphere};
 use nephroid::scene::ObjectId;
@@ -20,6 +21,7 @@ use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
 use obvhs::ray::{Ray as ObvhsRay, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
+use ray_sets::{RaySet, SIZES};
 use std::hint::black_box;
 use std::time::Duration;
 
@@ -33,9 +35,10 @@ fn rays(criterion: &mut CpuCriterion) {
     for count in [1, 2, 4, 8, 16] {
         bench_handful(criterion, count);
     }
-    for (name, cells) in SIZES {
-        bench_mesh(criterion, &format!("terrain{name}"), &terrain(cells));
-        bench_mesh(criterion, &format!("ball{name}"), &ball(cells));
+    for (size, cells) in SIZES {
+        for (name, mesh) in meshes::both(cells) {
+            bench_mesh(criterion, &format!("{name}{size}"), &mesh);
+        }
     }
 }
 

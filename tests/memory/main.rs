@@ -37,7 +37,9 @@ fn a_map_of_ten_million_photons_is_built_within_a_gigabyte() {
     let lookup = Lookup { point: here, normal: Vec3::Y, sheet: SheetId(0), radius: 0.1, both_sides: false };
     let irradiance = map.irradiance(&lookup).y;
     assert!((irradiance - 1.0).abs() < 0.01, "{irradiance}");
-    let (Some(before), Some(after), Some(most)) = (before, resident("VmRSS"), resident("VmHWM")) else { return };
+    let (Some(before), Some(after), Some(most)) = (before, resident("VmRSS"), resident("VmHWM")) else {
+        return;
+    };
     let each = (after - before) as f64 / f64::from(PHOTONS);
     println!("{each:.1} bytes per photon, {} MB at most", most / 1_000_000);
     assert!(most < 1_000_000_000, "{most}");

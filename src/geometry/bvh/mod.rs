@@ -9,6 +9,7 @@ use super::packet::{LaneRay, ShearedRay};
 use super::simd::{Column, Kernel, Lanes, dispatch};
 use super::{Bounds, HIT_ROUNDING, Ray};
 use arrayvec::ArrayVec;
+use glam::Vec3A;
 
 /// Deepest hierarchy that is built.
 const MAX_DEPTH: usize = 36;
@@ -78,13 +79,13 @@ struct Slabs<L: Lanes> {
 impl<L: Lanes> Slabs<L> {
     #[inline(always)]
     fn new(lanes: L, ray: &Ray, bounds: &Bounds) -> Self {
-        let (origin, direction) = (ray.origin, ray.direction);
-        let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs()).max_element();
-        let slack = reach * HIT_ROUNDING;
-        // Rounding the sum must not undo it.
-        let (above, below) = (origin + slack, origin - slack);
-        let above = [above.x.next_up(), above.y.next_up(), above.z.next_up()];
-        let below = [below.x.next_down(), below.y.next_down(), below.z.next_down()];
+        let (origin, direction) = (Vec3A::from(ray.origin), Vec3A::from(ray.direction));
+        let (min, max) = (Vec3A::from(bounds.min), Vec3A::from(bounds.max));
+        let reach = (min - origin).abs().max((max - origin).abs()).max_element();
+        // Rounding the sum, by half an ulp, must not undo it.
+        let slack = Vec3A::splat(reach * HIT_ROUNDING) + origin.abs() * f32::EPSILON;
+        let (above, below) = ((origin + slack).to_array(), (origin - slack).to_array());
+        let inverses = (Vec3A::ONE / direction).to_array();
         let mut slabs = Self {
             enter: [lanes.splat(0.0); 3],
             leave: [lanes.splat(0.0); 3],
@@ -93,7 +94,7 @@ impl<L: Lanes> Slabs<L> {
             zero: lanes.splat(0.0),
         };
         for axis in 0..3 {
-            let inverse = 1.0 / direction[axis];
+            let inverse = inverses[axis];
             let backwards = inverse < 0.0;
             slabs.enter[axis] = lanes.splat(if backwards { below[axis] } else { above[axis] });
             slabs.leave[axis] = lanes.splat(if backwards { above[axis] } else { below[axis] });
