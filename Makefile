@@ -11,15 +11,15 @@ test: browser
 # whole renders with two threads against one. Some six minutes, after compiling.
 bench:
 	rm -rf target/criterion
-	cargo bench --package nephroid --bench rays --bench structures --bench passes
-	cargo bench --package nephroid --bench baseline
+	cargo bench --bench rays --bench structures --bench passes
+	cargo bench --bench baseline
 	sh bench/embree/build.sh
-	cargo bench --package nephroid --bench embree
-	cargo bench --package nephroid --bench threads
+	cargo bench --bench embree
+	cargo bench --bench threads
 
 # What the last `make bench` found becomes the baseline.
 baseline:
-	cargo bench --package nephroid --bench baseline -- --save
+	cargo bench --bench baseline -- --save
 
 # The tests of the web page need a browser and its driver.
 browser:

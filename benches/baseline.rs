@@ -2,6 +2,7 @@
 //! look-up, triangle or pixel. `cargo bench --bench baseline` after the others; with `-- --save` they become the baseline.
 //!
 //! Times of another machine tell little: the table says whose they are.
+#![expect(clippy::print_stdout, reason = "the table is for whoever runs it")]
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

@@ -3,6 +3,7 @@
 //! `sh bench/embree/build.sh && cargo bench --bench embree`; without the yardstick only this library is timed. Embree is
 //! asked ray by ray, as a path asks. Its plain test may lose rays at shared edges; its robust one, like this library's,
 //! does not. `--quick` leaves out the largest meshes.
+#![expect(clippy::print_stdout, reason = "the table is for whoever runs it")]
 
 #[path = "common/meshes.rs"]
 mod meshes;

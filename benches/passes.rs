@@ -130,7 +130,7 @@ fn bench_map(criterion: &mut CpuCriterion) {
         group.bench_function("within", |b| {
             b.iter(|| lookups.iter().map(|lookup| map.irradiance(black_box(lookup))).sum::<Vec3>());
         });
-        let nearest = Nearest { count: 50, least: 0.0 };
+        let nearest = Nearest { count: 50, least: 0.25 * lookups[0].radius };
         group.bench_function("nearest50", |b| {
             let found = |lookup| map.nearest_radiance(lookup, nearest, |_| Vec3::ONE).radiance;
             b.iter(|| lookups.iter().map(|lookup| found(black_box(lookup))).sum::<Vec3>());

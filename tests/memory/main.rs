@@ -41,7 +41,7 @@ fn a_map_of_ten_million_photons_is_built_within_a_gigabyte() {
         return;
     };
     let each = (after - before) as f64 / f64::from(PHOTONS);
-    println!("{each:.1} bytes per photon, {} MB at most", most / 1_000_000);
+    eprintln!("{each:.1} bytes per photon, {} MB at most", most / 1_000_000);
     assert!(most < 1_000_000_000, "{most}");
     // Beyond what a photon is: the planes of the tree, one for 16 photons or more, and pages at the ends of arrays.
     assert!((each - BYTES_PER_PHOTON as f64).abs() < 4.0, "{each} bytes per photon");
