@@ -264,6 +264,7 @@ fn trace_block_at(
     let emission = Emission::new(scene, window);
     let batches = (0..block.count.div_ceil(BATCH))
         .into_par_iter()
+        .with_max_len(1)
         .map(|batch| {
             control.check()?;
             let end = ((batch + 1) * BATCH).min(block.count);
@@ -330,6 +331,7 @@ fn trace_images_at(
     let share = 1.0 / block.count as f32;
     let batches = (0..block.count.div_ceil(IMAGE_BATCH))
         .into_par_iter()
+        .with_max_len(1)
         .map(|batch| {
             control.check()?;
             let mut spread = Spread::default();

@@ -67,6 +67,8 @@ pub fn trace_image(
     let (across, down) = (image.width.div_ceil(TILE), image.height.div_ceil(TILE));
     let tiles = (0..across * down)
         .into_par_iter()
+        // Else a thread takes many at a time, and others have nothing to do while it is at the last of them.
+        .with_max_len(1)
         .map(|tile| {
             control.check()?;
             let traced = trace_tile(context, direct.as_ref(), (tile % across * TILE, tile / across * TILE));

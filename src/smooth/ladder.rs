@@ -122,12 +122,18 @@ impl Ladder {
                 plane[local] = irradiance;
             }
         }
-        let levels: Vec<Filtered> =
-            widths(gathered).par_iter().map(|level| filter(*level, &raw, &mask, segment.size)).collect();
+        let levels: Vec<Filtered> = widths(gathered)
+            .par_iter()
+            .with_max_len(1)
+            .map(|level| filter(*level, &raw, &mask, segment.size))
+            .collect();
         let weights = weights(segment, samples, &levels[3], floor);
         let costs = Costs { levels: &levels, weights: &weights, mask: &mask };
-        let sums: Vec<Cost> =
-            (0..levels.len()).into_par_iter().map(|level| costs.sums(level, segment.size)).collect();
+        let sums: Vec<Cost> = (0..levels.len())
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|level| costs.sums(level, segment.size))
+            .collect();
         let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
         let mut choices = choose(&levels, (&sums, &counts, windows(gathered)), &weights);
         estimate(&mut choices, &costs, &counts);
