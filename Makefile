@@ -1,4 +1,4 @@
-.PHONY: serve test bench browser gallery chart chart-quick stability openapi crash load fuzz image
+.PHONY: serve test bench baseline browser gallery chart chart-quick stability openapi crash load fuzz image
 
 # Builds and starts the service on http://127.0.0.1:8080; settings as flags, e.g. `make serve ARGS="--threads 4"`.
 serve:
@@ -7,9 +7,19 @@ serve:
 test: browser
 	cargo test --workspace
 
-# Rays against other structures and builders.
+# The hot pieces on one thread, against bench/baseline.json; rays against Embree (Debian: apt-get install libembree-dev);
+# whole renders with two threads against one. Some six minutes, after compiling.
 bench:
-	cargo bench --package nephroid
+	rm -rf target/criterion
+	cargo bench --bench rays --bench structures --bench passes
+	cargo bench --bench baseline
+	sh bench/embree/build.sh
+	cargo bench --bench embree
+	cargo bench --bench threads
+
+# What the last `make bench` found becomes the baseline.
+baseline:
+	cargo bench --bench baseline -- --save
 
 # The tests of the web page need a browser and its driver.
 browser:

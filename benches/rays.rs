@@ -3,9 +3,17 @@
 //! `cargo bench --bench rays -- <filter>`; a name is mesh/kind of rays/structure. Primary rays come in the
 //! order of the pixels; bounces leave in all directions; shadow rays ask for any hit on the way to a lamp.
 
-use criterion::{Criterion, Throughput};
+#[path = "common/cpu_time.rs"]
+mod cpu_time;
+#[path = "common/meshes.rs"]
+mod meshes;
+#[path = "common/ray_sets.rs"]
+mod ray_sets;
+
+use cpu_time::{CpuCriterion, criterion};
+use criterion::Throughput;
 use glam::{Vec3, Vec3A};
-use nephroid::geometry::{Geometry, GeometryBuilder, MeshData, Ray, Structure, offset_origin};
+use nephroid::geometry::{GeometryBuilder, MeshData, Ray, Structure};
 use nephroid::sampling::{SamplePoint, uniform_sphere};
 use nephroid::scene::ObjectId;
 use obvhs::BvhBuildParams;
@@ -13,34 +21,29 @@ use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
 use obvhs::ray::{Ray as ObvhsRay, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
+use ray_sets::{RaySet, SIZES};
 use std::hint::black_box;
-use std::time::{Duration, Instant};
-
-/// Pixels across and down.
-const SIDE: u16 = 256;
+use std::time::Duration;
 
 fn main() {
-    let mut criterion = Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(300))
-        .measurement_time(Duration::from_millis(1200))
-        .configure_from_args();
+    let mut criterion = criterion();
     rays(&mut criterion);
     criterion.final_summary();
 }
 
-fn rays(criterion: &mut Criterion) {
+fn rays(criterion: &mut CpuCriterion) {
     for count in [1, 2, 4, 8, 16] {
         bench_handful(criterion, count);
     }
-    for (name, cells) in [("10k", 70_u16), ("100k", 223), ("1M", 707)] {
-        bench_mesh(criterion, &format!("terrain{name}"), &terrain(cells));
-        bench_mesh(criterion, &format!("ball{name}"), &ball(cells));
+    for (size, cells) in SIZES {
+        for (name, mesh) in meshes::both(cells) {
+            bench_mesh(criterion, &format!("{name}{size}"), &mesh);
+        }
     }
 }
 
 /// A handful of spheres and squares, where a list competes with the hierarchy.
-fn bench_handful(criterion: &mut Criterion, count: u32) {
+fn bench_handful(criterion: &mut CpuCriterion, count: u32) {
     let fill = |structure| {
         let mut builder = GeometryBuilder::default();
         for i in 0..count {
@@ -77,12 +80,10 @@ fn bench_handful(criterion: &mut Criterion, count: u32) {
     group.finish();
 }
 
-fn bench_mesh(criterion: &mut Criterion, name: &str, mesh: &MeshData) {
+fn bench_mesh(criterion: &mut CpuCriterion, name: &str, mesh: &MeshData) {
     let mut builder = GeometryBuilder::default();
     builder.mesh(ObjectId(0), mesh);
-    let start = Instant::now();
     let geometry = builder.build();
-    eprintln!("{name}: built in {:?}", start.elapsed());
     let other = Cwbvh::new(mesh);
     let rays = RaySet::new(&geometry);
     eprintln!(
@@ -109,76 +110,6 @@ fn bench_mesh(criterion: &mut Criterion, name: &str, mesh: &MeshData) {
         b.iter(|| rays.shadow.iter().filter(|(r, t)| other.any(black_box(r), *t)).count());
     });
     group.finish();
-}
-
-struct RaySet {
-    primary: Vec<Ray>,
-    bounce: Vec<Ray>,
-    shadow: Vec<(Ray, f32)>,
-}
-
-impl RaySet {
-    fn new(geometry: &Geometry) -> Self {
-        let eye = Vec3::new(0.4, 1.9, 2.6);
-        let forward = (Vec3::new(0.0, -0.1, 0.0) - eye).normalize();
-        let right = forward.cross(Vec3::Y).normalize();
-        let up = right.cross(forward);
-        let lamp = Vec3::new(-0.7, 4.0, 0.9);
-        let mut set = Self { primary: Vec::new(), bounce: Vec::new(), shadow: Vec::new() };
-        for index in 0..u32::from(SIDE) * u32::from(SIDE) {
-            let at = |i: u32| (i as f32 + 0.5) / f32::from(SIDE) - 0.5;
-            let (x, y) = (at(index % u32::from(SIDE)), at(index / u32::from(SIDE)));
-            let ray = Ray::new(eye, (forward + right * x * 0.8 - up * y * 0.8).normalize());
-            if let Some(hit) = geometry.closest_hit(&ray) {
-                let s = hit.surface;
-                let sample = SamplePoint::new(3, index);
-                let facing = if s.normal.dot(ray.direction) > 0.0 { -s.normal } else { s.normal };
-                let away = (facing + uniform_sphere(sample.get_2d(0)) * 0.999).normalize();
-                set.bounce.push(Ray::new(offset_origin(s.point, s.error, s.normal, away), away));
-                let to_lamp = lamp + uniform_sphere(sample.get_2d(2)) * 0.3 - s.point;
-                let away = to_lamp.normalize();
-                let start = offset_origin(s.point, s.error, s.normal, away);
-                set.shadow.push((Ray::new(start, away), to_lamp.length()));
-            }
-            set.primary.push(ray);
-        }
-        set
-    }
-}
-
-/// A square of hills with `2 * cells²` triangles.
-fn terrain(cells: u16) -> MeshData {
-    grid(cells, cells, |u, v| {
-        let (x, z) = (4.0 * u - 2.0, 4.0 * v - 2.0);
-        let wave = |k: f32, a: f32| a * (k * x + 0.7 * k * z).sin() * (0.9 * k * z - 0.3 * k * x).cos();
-        Vec3::new(x, wave(2.1, 0.3) + wave(7.3, 0.08) + wave(31.0, 0.02) + wave(113.0, 0.006), z)
-    })
-}
-
-/// A dented ball with `2 * cells²` triangles.
-fn ball(cells: u16) -> MeshData {
-    grid(cells, cells, |u, v| {
-        let (phi, theta) = (u * std::f32::consts::TAU, v * std::f32::consts::PI);
-        let radius = 1.0 + 0.02 * (20.0 * phi).sin() * (17.0 * theta).sin();
-        Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()) * radius
-    })
-}
-
-fn grid(across: u16, down: u16, point: impl Fn(f32, f32) -> Vec3) -> MeshData {
-    let mut mesh = MeshData::default();
-    for i in 0..=down {
-        for j in 0..=across {
-            mesh.positions.push(point(f32::from(j) / f32::from(across), f32::from(i) / f32::from(down)));
-        }
-    }
-    let at = |i: u16, j: u16| u32::from(i) * (u32::from(across) + 1) + u32::from(j);
-    for i in 0..down {
-        for j in 0..across {
-            mesh.triangles.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
-            mesh.triangles.push([at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)]);
-        }
-    }
-    mesh
 }
 
 /// The other structure, with its own triangle test, and a surface normal for the nearest hit.

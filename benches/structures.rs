@@ -1,13 +1,16 @@
 //! The four structures on the same rays: a handful of shapes, an even sheet of triangles, and small things in a large
 //! place, where a uniform grid fails. `cargo bench --bench structures`.
 
-use criterion::{Criterion, Throughput};
+#[path = "common/cpu_time.rs"]
+mod cpu_time;
+
+use cpu_time::{CpuCriterion, criterion};
+use criterion::Throughput;
 use glam::Vec2;
 use nephroid::geometry::{Ray, Structure};
 use nephroid::scene::{DirectoryAssets, Scene};
 use serde_json::{Value, json};
 use std::hint::black_box;
-use std::time::Duration;
 
 /// Rays across and down the picture.
 const RAYS: [u32; 2] = [80, 60];
@@ -21,18 +24,14 @@ const STRUCTURES: [(&str, Structure, bool); 4] = [
 ];
 
 fn main() {
-    let mut criterion = Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(300))
-        .measurement_time(Duration::from_secs(1))
-        .configure_from_args();
+    let mut criterion = criterion();
     for name in ["phong", "shapes", "pool", "stadium"] {
         bench(&mut criterion, name);
     }
     criterion.final_summary();
 }
 
-fn bench(criterion: &mut Criterion, name: &str) {
+fn bench(criterion: &mut CpuCriterion, name: &str) {
     let text = std::fs::read_to_string(format!("scenes/{name}.json")).expect("run at the repository's root");
     let mut group = criterion.benchmark_group(name);
     group.throughput(Throughput::Elements(u64::from(RAYS[0] * RAYS[1])));

@@ -2,13 +2,16 @@
 
 use crate::image_io::LinearImage;
 use crate::scene::{ImageSettings, Tone};
+use rayon::prelude::*;
 use std::sync::LazyLock;
 
 /// The picture as 8-bit sRGB, three bytes per pixel, top row first. Pixels must be finite; NaN becomes 0.
 #[must_use]
 pub fn develop(image: &LinearImage, settings: &ImageSettings) -> Vec<u8> {
     let gain = libm::exp2(f64::from(settings.exposure));
-    image.pixels.iter().flatten().map(|x| to_byte(shown(*x, gain, settings.tone))).collect()
+    let byte = |x: f32| to_byte(shown(x, gain, settings.tone));
+    let pixels: Vec<[u8; 3]> = image.pixels.par_iter().map(|pixel| pixel.map(byte)).collect();
+    pixels.into_flattened()
 }
 
 /// How much light the display is asked for, of which it gives 1 at most.

@@ -7,6 +7,7 @@
 
 use crate::picture::PixelError;
 use crate::sampling::hash;
+use rayon::prelude::*;
 
 /// What a round does more than the first one did.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -103,7 +104,7 @@ impl Effort {
             let scale = if wanted.mean > 0.0 { mean / wanted.mean } else { 0.0 };
             let missing = |w: &f32| (w * scale - 1.0).clamp(0.0, MOST_GROWTH);
             let dithered = |(i, w): (usize, &f32)| (missing(w) + dither(key, i)).floor() as u8;
-            wanted.pixels.iter().enumerate().map(dithered).collect()
+            wanted.pixels.par_iter().enumerate().map(dithered).collect()
         };
         let samples = more(&Wanted::samples(measured), SAMPLES);
         let paths = Wanted::paths(measured).map_or_else(Vec::new, |wanted| more(&wanted, PATHS));
@@ -182,7 +183,8 @@ impl Wanted {
             sum / count
         };
         let cost = rays.max(1.0);
-        let pixels: Vec<f32> = (0..variance.len()).map(|i| (around(i) / cost).sqrt()).collect();
+        let pixels: Vec<f32> =
+            (0..variance.len()).into_par_iter().map(|i| (around(i) / cost).sqrt()).collect();
         let mean = pixels.iter().sum::<f32>() / pixels.len().max(1) as f32;
         Self { pixels, mean, cost }
     }
@@ -198,7 +200,7 @@ impl Wanted {
             let most = MOST_SAMPLES.min(MOST_GROWTH * had.max(1) as f32);
             ((w * scale).clamp(LEAST_SAMPLES, most) + dither(key, i)).floor() as u8
         };
-        self.pixels.iter().zip(had).enumerate().map(round).collect()
+        self.pixels.par_iter().zip(had).enumerate().map(round).collect()
     }
 }
 

@@ -9,6 +9,7 @@ use crate::image_io::LinearImage;
 use crate::light_path::PathClass;
 use crate::scene::Caustics;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 const CLASSES: usize = PathClass::ALL.len();
 
@@ -194,16 +195,24 @@ impl RoundFilm {
     /// With this many named layers.
     pub(crate) fn new(width: u32, height: u32, layers: usize) -> Self {
         let count = width as usize * height as usize;
-        let (pixels, layers) =
-            (vec![PixelSums::default(); count], vec![LayerSums::default(); count * layers]);
+        // In parallel, as it is the first to touch the memory.
+        let pixels = (0..count).into_par_iter().map(|_| PixelSums::default()).collect();
+        let layers = (0..count * layers).into_par_iter().map(|_| LayerSums::default()).collect();
         Self { width, pixels, layers }
     }
 
-    /// Puts a tile's pixels, row by row, at (x, y).
-    pub(crate) fn put(&mut self, x: u32, y: u32, tile_width: u32, pixels: &[PixelSums]) {
-        for (row, values) in pixels.chunks_exact(tile_width as usize).enumerate() {
-            let start = (y as usize + row) * self.width as usize + x as usize;
-            self.pixels[start..start + values.len()].copy_from_slice(values);
+    /// Puts square tiles of this side, or less at the right and at the bottom, row by row, as are their pixels.
+    pub(crate) fn put_tiles<T: Sync>(
+        &mut self,
+        side: u32,
+        tiles: &[T],
+        sums: impl Fn(&T) -> (&[PixelSums], &[LayerSums]) + Sync,
+    ) {
+        let (width, side) = (self.width as usize, side as usize);
+        let each = self.layers.len() / self.pixels.len();
+        put_tiles(&mut self.pixels, (width, side, side), tiles, |tile| sums(tile).0);
+        if each > 0 {
+            put_tiles(&mut self.layers, (width * each, side * each, side), tiles, |tile| sums(tile).1);
         }
     }
 
@@ -213,6 +222,24 @@ impl RoundFilm {
             pixel.halves[half].classes.add(PathClass::Caustic, radiance.as_vec3());
         }
     }
+}
+
+/// Puts tiles into rows of `row` values; a tile has `across` to a row, and `down` rows.
+fn put_tiles<T: Sync, V: Copy + Send>(
+    values: &mut [V],
+    (row, across, down): (usize, usize, usize),
+    tiles: &[T],
+    of: impl Fn(&T) -> &[V] + Sync,
+) {
+    let bands = values.par_chunks_mut(row * down).zip(tiles.par_chunks(row.div_ceil(across)));
+    bands.for_each(|(band, tiles)| {
+        for (tile, start) in tiles.iter().zip((0..row).step_by(across)) {
+            let width = across.min(row - start);
+            for (line, from) in band.chunks_exact_mut(row).zip(of(tile).chunks_exact(width)) {
+                line[start..start + width].copy_from_slice(from);
+            }
+        }
+    });
 }
 
 /// The sum of finished rounds. Rounds are added in their order, one after the other, so that the same rounds
@@ -260,18 +287,18 @@ impl Film {
 
     fn add(&mut self, mut round: RoundFilm, photon_weight: f32) {
         self.photon_weight += photon_weight;
-        for (sum, pixel) in self.pixels.iter_mut().zip(&mut round.pixels) {
-            pixel.weigh_photons(photon_weight, self.caustics);
+        let caustics = self.caustics;
+        self.pixels.par_iter_mut().zip(&mut round.pixels).for_each(|(sum, pixel)| {
+            pixel.weigh_photons(photon_weight, caustics);
             sum.add(pixel);
-        }
-        for (sum, layer) in self.layers.iter_mut().zip(&round.layers) {
-            sum.add(layer, photon_weight);
-        }
+        });
+        let layers = self.layers.par_iter_mut().zip(&round.layers);
+        layers.for_each(|(sum, layer)| sum.add(layer, photon_weight));
     }
 
     /// Means of every pixel, row by row.
-    pub fn means(&self) -> impl Iterator<Item = PixelMeans> + '_ {
-        self.pixels.iter().map(|pixel| pixel.means(self.photon_weight, self.caustics))
+    pub fn means(&self) -> impl IndexedParallelIterator<Item = PixelMeans> + '_ {
+        self.pixels.par_iter().map(|pixel| pixel.means(self.photon_weight, self.caustics))
     }
 
     /// The estimator of the caustics.
@@ -310,7 +337,7 @@ impl Film {
         self.map(|means| means.halves[half].total())
     }
 
-    fn map(&self, value: impl Fn(&PixelMeans) -> Vec3) -> LinearImage {
+    fn map(&self, value: impl Fn(&PixelMeans) -> Vec3 + Sync) -> LinearImage {
         let pixels = self.means().map(|means| value(&means).to_array()).collect();
         LinearImage { width: self.width, height: self.height, pixels }
     }

@@ -8,6 +8,7 @@ use crate::plan::Layer;
 use crate::scene::Caustics;
 use crate::smooth::{Gathered, Smoothed, Smoothing, smooth, smooth_part};
 use glam::Vec3;
+use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// A film with its smoothing.
@@ -97,7 +98,7 @@ impl<'a> Picture<'a> {
         let mean = image.pixels.iter().map(|p| mean_channel(Vec3::from_array(*p))).sum::<f32>();
         let floor = 0.1 * mean / image.pixels.len() as f32;
         let around = around(&image);
-        let pixels = self.film.means().zip(image.pixels.iter().zip(around)).enumerate();
+        let pixels = self.film.means().zip(image.pixels.par_iter().zip(around)).enumerate();
         pixels
             .map(|(i, (means, (value, around)))| {
                 self.error(i, &means, (Vec3::from_array(*value), around), floor)
@@ -196,13 +197,13 @@ fn around(image: &LinearImage) -> Vec<Vec3> {
             PAIRS.iter().filter_map(|&(dx, dy)| Some(0.5 * (at(x - dx, y - dy)? + at(x + dx, y + dy)?)));
         means.reduce(Vec3::min).unwrap_or(Vec3::ZERO)
     };
-    (0..image.pixels.len()).map(least).collect()
+    (0..image.pixels.len()).into_par_iter().map(least).collect()
 }
 
 fn add(mut image: LinearImage, correction: &[Vec3]) -> LinearImage {
-    for (pixel, correction) in image.pixels.iter_mut().zip(correction) {
+    image.pixels.par_iter_mut().zip(correction).for_each(|(pixel, correction)| {
         *pixel = (Vec3::from_array(*pixel) + *correction).to_array();
-    }
+    });
     image
 }
 

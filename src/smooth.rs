@@ -125,7 +125,9 @@ fn smooth_one(
     if samples.iter().all(|s| s.irradiance == [Vec3::ZERO; 2]) {
         return None;
     }
-    let sum: f32 = film.means().map(|means| mean_channel(means.total())).sum();
+    // Summed in the order of the pixels, whatever the number of threads.
+    let totals: Vec<f32> = film.means().map(|means| mean_channel(means.total())).collect();
+    let sum: f32 = totals.iter().sum();
     let floor = 0.1 * sum / samples.len() as f32;
     let filtered: Vec<(Segment, Ladder)> = lit_segments(segments, &samples)
         .map(|segment| {

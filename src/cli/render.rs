@@ -82,7 +82,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let mut render = Render::new(scene, plan);
     let ended = pool.install(|| run_rounds(&mut render, &control, &reporter));
     if render.rounds() > 0 {
-        let outputs = arguments.write(&render)?;
+        let outputs = pool.install(|| arguments.write(&render))?;
         reporter.done(&render, &outputs);
     }
     match ended {

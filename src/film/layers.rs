@@ -61,15 +61,6 @@ impl LayerSums {
 }
 
 impl RoundFilm {
-    /// Puts a tile's layers, as [`RoundFilm::put`] its pixels.
-    pub(crate) fn put_layers(&mut self, x: u32, y: u32, tile_width: u32, layers: &[LayerSums]) {
-        let each = self.layers.len() / self.pixels.len();
-        for (row, values) in layers.chunks_exact((tile_width as usize * each).max(1)).enumerate() {
-            let start = ((y as usize + row) * self.width as usize + x as usize) * each;
-            self.layers[start..start + values.len()].copy_from_slice(values);
-        }
-    }
-
     /// Adds what photons connected to the eye bring to a layer, in either half; row by row.
     pub(crate) fn add_to_layer(&mut self, layer: usize, radiance: &[DVec3]) {
         let each = self.layers.len() / self.pixels.len();

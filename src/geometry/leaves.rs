@@ -70,6 +70,17 @@ impl Word {
         Self(index as u32)
     }
 
+    /// Its bits, and back.
+    #[inline(always)]
+    pub(super) fn bits(self) -> u32 {
+        self.0
+    }
+
+    #[inline(always)]
+    pub(super) fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
     #[inline(always)]
     pub(super) fn child(self) -> Child {
         let index = (self.0 & ((1 << KIND) - 1)) as usize;

@@ -8,7 +8,7 @@ use super::bounds::Bounds;
 use super::nearest::{Nearest, Place};
 use super::simd::{Column, Lanes};
 use super::{Ray, SurfacePoint};
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec3A};
 
 /// The corners of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,33 +38,31 @@ pub(super) struct ShearedRay {
 impl ShearedRay {
     #[inline]
     pub(super) fn new(ray: &Ray) -> Self {
+        /// The winding does not matter: both sides are hit.
+        const AXES: [[usize; 3]; 4] = [[1, 2, 0], [2, 0, 1], [0, 1, 2], [0, 1, 2]];
         let d = ray.direction;
         let a = d.abs();
-        let z = if a.x >= a.y && a.x >= a.z {
-            0
-        } else if a.y >= a.z {
-            1
-        } else {
-            2
-        };
-        // The winding does not matter: both sides are hit.
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let shear = Vec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]);
-        Self { origin: ray.origin, axes: [x, y, z], shear }
+        // Without branches, which nothing could predict.
+        let not_x = usize::from(a.x < a.y) | usize::from(a.x < a.z);
+        let axes = AXES[not_x << usize::from(a.y < a.z)];
+        let d = d.to_array();
+        let [x, y, z] = axes.map(|axis| d[axis]);
+        let shear = Vec3A::new(x, y, 1.0) / z;
+        Self { origin: ray.origin, axes, shear: shear.into() }
     }
 
     /// A corner in the sheared space.
     #[inline]
     fn transform(&self, corner: Vec3) -> Vec3 {
-        let p = corner - self.origin;
-        let [x, y, z] = self.axes;
-        Vec3::new(p[x] - self.shear.x * p[z], p[y] - self.shear.y * p[z], self.shear.z * p[z])
+        let p = (corner - self.origin).to_array();
+        let [x, y, z] = self.axes.map(|axis| p[axis]);
+        Vec3::new(x - self.shear.x * z, y - self.shear.y * z, self.shear.z * z)
     }
 }
 
 impl Triangle {
     /// Distance along the ray in `(0, t_max)` and the barycentric weights of the three corners.
-    #[inline]
+    #[inline(always)]
     pub(super) fn intersect(&self, ray: &ShearedRay, t_max: f32) -> Option<(f32, Vec3)> {
         let [a, b, c] = self.0.map(|corner| ray.transform(corner));
         let mut u = c.x * b.y - c.y * b.x;
@@ -86,6 +84,7 @@ impl Triangle {
     }
 
     /// The surface at the point with these barycentric weights.
+    #[inline(always)]
     pub(super) fn surface(&self, weights: Vec3, shading: &TriangleShading) -> SurfacePoint {
         let [a, b, c] = self.0;
         let point = a * weights.x + b * weights.y + c * weights.z;
@@ -193,7 +192,9 @@ impl Packet {
 
     #[inline]
     pub(super) fn triangle(&self, lane: usize) -> Triangle {
-        Triangle(std::array::from_fn(|k| Vec3::from(self.corners[k].map(|column| column[lane]))))
+        // By reference: moved, the columns are copied whole.
+        let corner = |[x, y, z]: &[Column; 3]| Vec3::new(x[lane], y[lane], z[lane]);
+        Triangle([corner(&self.corners[0]), corner(&self.corners[1]), corner(&self.corners[2])])
     }
 
     /// Finds the nearest hit among its triangles; `index` is its own place.

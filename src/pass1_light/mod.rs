@@ -164,15 +164,13 @@ impl RoundLists {
     /// Builds the trees; if second D are to look photons up, those of about so few photons too, which a key picks.
     #[must_use]
     pub fn into_maps(self, thin_to: Option<(usize, u64)>) -> RoundPhotons {
-        let build = |[a, b]: [&[Photon]; 2]| {
+        let build = |[a, b]: [Vec<Photon>; 2]| {
             <[PhotonMap; 2]>::from(rayon::join(|| PhotonMap::build(a), || PhotonMap::build(b)))
         };
-        let [a, b] = &self.halves;
-        let maps = build([a, b]);
         let thinned = thin_to.map(|(count, key)| {
-            let [a, b] = [0, 1].map(|half| thin(&self.halves[half], count, hash(key, half as u64)));
-            build([&a, &b])
+            build([0, 1].map(|half| thin(&self.halves[half], count, hash(key, half as u64))))
         });
+        let maps = build(self.halves);
         RoundPhotons { maps, thinned, spreads: self.spreads, times: self.times, tallies: self.tallies }
     }
 }
@@ -266,6 +264,7 @@ fn trace_block_at(
     let emission = Emission::new(scene, window);
     let batches = (0..block.count.div_ceil(BATCH))
         .into_par_iter()
+        .with_max_len(1)
         .map(|batch| {
             control.check()?;
             let end = ((batch + 1) * BATCH).min(block.count);
@@ -332,6 +331,7 @@ fn trace_images_at(
     let share = 1.0 / block.count as f32;
     let batches = (0..block.count.div_ceil(IMAGE_BATCH))
         .into_par_iter()
+        .with_max_len(1)
         .map(|batch| {
             control.check()?;
             let mut spread = Spread::default();

@@ -117,8 +117,9 @@ impl Footprints {
 
     fn between_corners(scene: &Scene, eye_media: &Media) -> Vec<Option<Footprint>> {
         let (width, height) = (scene.image.width as usize, scene.image.height as usize);
-        let corners: Vec<Vec<Option<Landing>>> = (0..=height)
+        let corners: Vec<Vec<Option<Landing>>> = (0..height + 1)
             .into_par_iter()
+            .with_max_len(1)
             .map(|y| (0..=width).map(|x| land(scene, eye_media, Vec2::new(x as f32, y as f32))).collect())
             .collect();
         let rows: Vec<Vec<Option<Footprint>>> = (0..height)

@@ -67,6 +67,8 @@ pub fn trace_image(
     let (across, down) = (image.width.div_ceil(TILE), image.height.div_ceil(TILE));
     let tiles = (0..across * down)
         .into_par_iter()
+        // Else a thread takes many at a time, and others have nothing to do while it is at the last of them.
+        .with_max_len(1)
         .map(|tile| {
             control.check()?;
             let traced = trace_tile(context, direct.as_ref(), (tile % across * TILE, tile / across * TILE));
@@ -76,18 +78,12 @@ pub fn trace_image(
         .collect::<Result<Vec<_>, RenderError>>()?;
     let mut film = RoundFilm::new(image.width, image.height, context.plan.layer_names.len());
     let mut counts = EyeCounts::default();
-    for tile in tiles {
-        counts.add(&tile.counts);
-        film.put(tile.x, tile.y, tile.width, &tile.pixels);
-        film.put_layers(tile.x, tile.y, tile.width, &tile.layers);
-    }
+    tiles.iter().for_each(|tile| counts.add(&tile.counts));
+    film.put_tiles(TILE, &tiles, |tile| (&tile.pixels, &tile.layers));
     Ok((film, counts))
 }
 
 struct Tile {
-    x: u32,
-    y: u32,
-    width: u32,
     pixels: Vec<PixelSums>,
     layers: Vec<LayerSums>,
     counts: EyeCounts,
@@ -128,7 +124,7 @@ fn trace_tile(
             layers.extend_from_slice(walk.layers.sums());
         }
     }
-    Ok(Tile { x, y, width, pixels, layers, counts: walk.counts })
+    Ok(Tile { pixels, layers, counts: walk.counts })
 }
 
 /// One pixel's samples of this round in both halves. Photons are counted on the pixel's footprint; the eye

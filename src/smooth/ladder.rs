@@ -128,13 +128,19 @@ impl Ladder {
                 plane[local] = irradiance;
             }
         }
-        let levels: Vec<Filtered> =
-            widths(gathered).par_iter().map(|level| filter(*level, &raw, &mask, segment.size)).collect();
+        let levels: Vec<Filtered> = widths(gathered)
+            .par_iter()
+            .with_max_len(1)
+            .map(|level| filter(*level, &raw, &mask, segment.size))
+            .collect();
         // What to choose by is known before the choice from a middling width.
         let even = weights(segment, samples, |i| levels[3].mean(i), floor);
         let costs = Costs { levels: &levels, weights: &even, mask: &mask };
-        let sums: Vec<Cost> =
-            (0..levels.len()).into_par_iter().map(|level| costs.sums(level, segment.size)).collect();
+        let sums: Vec<Cost> = (0..levels.len())
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|level| costs.sums(level, segment.size))
+            .collect();
         let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
         let mut choices = choose(&levels, (&sums, &counts, windows(gathered)), &even);
         // Errors are relative to what was chosen: beside something bright a middling width holds its light, of which a part is

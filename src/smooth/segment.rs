@@ -1,6 +1,7 @@
 //! Segments: connected pixels whose eye rays reach one smooth piece of the same surface.
 
 use crate::pass2_eye::{Footprints, Sight};
+use rayon::prelude::*;
 
 /// Connected pixels of one smooth surface, and the box around them.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,8 +61,10 @@ const SAME_FACE: f32 = 0.95;
 /// it is irradiance that is filtered, of the others radiance.
 pub(super) fn segments(footprints: &Footprints) -> Vec<Segment> {
     let (count, width) = footprints.size();
-    let sights: Vec<Option<(bool, Sight)>> =
-        (0..count).map(|i| Some((footprints.get(i).is_some(), footprints.sight(i)?))).collect();
+    let sights: Vec<Option<(bool, Sight)>> = (0..count)
+        .into_par_iter()
+        .map(|i| Some((footprints.get(i).is_some(), footprints.sight(i)?)))
+        .collect();
     let mut seen = vec![false; count];
     let mut segments = Vec::new();
     let mut queue = Vec::new();

@@ -82,11 +82,11 @@ fn f44_f46_identical_photons_are_all_found() {
 /// F45: no photon, one photon, and radii without size.
 #[test]
 fn f45_few_photons_and_empty_radii_give_finite_estimates() {
-    let none = PhotonMap::build(&[]);
+    let none = PhotonMap::build(Vec::<Photon>::new());
     assert!(none.is_empty());
     assert_eq!(none.irradiance(&lookup(Vec3::ZERO, 1.0)), Vec3::ZERO);
     agrees_with_brute_force(&[photon(Vec3::ZERO)], [lookup(Vec3::new(0.5, 0.0, 0.0), 1.0)].into_iter());
-    let one = PhotonMap::build(&[photon(Vec3::ZERO)]);
+    let one = PhotonMap::build([photon(Vec3::ZERO)]);
     for radius in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30] {
         assert_eq!(one.irradiance(&lookup(Vec3::ZERO, radius)), Vec3::ZERO, "{radius}");
     }
@@ -114,10 +114,10 @@ fn f49_photons_of_other_surfaces_do_not_count() {
     let wall = Photon { normal: Vec3::X, direction: Vec3::new(-0.8, -0.6, 0.0), ..photon(here) };
     let above = photon(here + Vec3::Y * 0.09);
     for stranger in [from_below, other_sheet, wall, above] {
-        let found = count_of(&PhotonMap::build(&[stranger]), &lookup(here, 0.1));
+        let found = count_of(&PhotonMap::build([stranger]), &lookup(here, 0.1));
         assert_eq!(found, 0, "{stranger:?}");
     }
-    assert_eq!(count_of(&PhotonMap::build(&[photon(here)]), &lookup(here, 0.1)), 1);
+    assert_eq!(count_of(&PhotonMap::build([photon(here)]), &lookup(here, 0.1)), 1);
 }
 
 /// The kernel is unbiased where the density is uniform: n photons on the unit square make n per area. Standard
@@ -161,7 +161,7 @@ fn t37_the_nearest_photons_without_the_last_are_unbiased() {
     for k in [5, 10, 50] {
         let values: Vec<f64> = (0..maps)
             .map(|seed| {
-                let map = PhotonMap::build(&scattered(n, hash(k as u64, seed)));
+                let map = PhotonMap::build(scattered(n, hash(k as u64, seed)));
                 nearest(&map, Vec3::new(0.5, 0.0, 0.5), 0.5, k, 1e-4).0 / f64::from(n)
             })
             .collect();
@@ -185,7 +185,7 @@ fn f45_f47_fewer_photons_than_asked_for_do_not_blur_beyond_the_greatest_radius()
     let (near, short) = nearest(&map, Vec3::ZERO, 0.5, K, 0.01);
     assert!(short && (near / disc(2.0, 0.5) - 1.0).abs() < 1e-5, "{near}");
     assert_eq!(nearest(&map, Vec3::new(1.5, 0.0, 0.0), 0.5, K, 0.01), (0.0, true));
-    assert_eq!(nearest(&PhotonMap::build(&[]), Vec3::ZERO, 0.5, K, 0.01), (0.0, true));
+    assert_eq!(nearest(&PhotonMap::build(Vec::<Photon>::new()), Vec3::ZERO, 0.5, K, 0.01), (0.0, true));
     let (alone, short) = nearest(&PhotonMap::build(&dark[..1]), Vec3::ZERO, 0.5, K, 0.01);
     assert!(short && (alone / disc(1.0, 0.5) - 1.0).abs() < 1e-5, "{alone}");
     for radius in [0.0, -1.0, f32::NAN] {
@@ -197,7 +197,7 @@ fn f45_f47_fewer_photons_than_asked_for_do_not_blur_beyond_the_greatest_radius()
 #[test]
 fn f46_identical_photons_are_spread_over_the_least_disc() {
     let at = Vec3::new(0.3, 0.0, 0.7);
-    let map = PhotonMap::build(&vec![photon(at); 100]);
+    let map = PhotonMap::build(vec![photon(at); 100]);
     let (value, short) = nearest(&map, at, 0.5, K, 0.01);
     let expected = 100.0 / (std::f64::consts::PI * 1e-4);
     assert!(!short && (value / expected - 1.0).abs() < 1e-5, "{value} {expected}");
@@ -328,7 +328,7 @@ fn f50_the_kernels_mass_takes_the_bias_at_a_border_away() {
         let point = Vec3::new(x, 0.0, z);
         let mass = geometry.kernel_mass(SheetId(0), point, radius, 0.0);
         let sum: f64 = (0..64)
-            .map(|seed| PhotonMap::build(&scattered(4000, hash(50, seed))).irradiance(&lookup(point, radius)))
+            .map(|seed| PhotonMap::build(scattered(4000, hash(50, seed))).irradiance(&lookup(point, radius)))
             .map(|irradiance| f64::from(irradiance.y / mass) / 4000.0)
             .sum();
         assert!((sum / 64.0 - 1.0).abs() < 0.05, "{x} {z}: {}", sum / 64.0);

@@ -9,6 +9,7 @@ use super::packet::{LaneRay, ShearedRay};
 use super::simd::{Column, Kernel, Lanes, dispatch};
 use super::{Bounds, HIT_ROUNDING, Ray};
 use arrayvec::ArrayVec;
+use glam::Vec3A;
 
 /// Deepest hierarchy that is built.
 const MAX_DEPTH: usize = 36;
@@ -26,7 +27,7 @@ pub(super) struct Bvh {
 
 /// Eight boxes and what is in them.
 #[derive(Clone, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 struct Node {
     /// Least and greatest x, then y, then z; an empty interval where there is no child.
     planes: [Column; 6],
@@ -78,13 +79,13 @@ struct Slabs<L: Lanes> {
 impl<L: Lanes> Slabs<L> {
     #[inline(always)]
     fn new(lanes: L, ray: &Ray, bounds: &Bounds) -> Self {
-        let (origin, direction) = (ray.origin, ray.direction);
-        let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs()).max_element();
-        let slack = reach * HIT_ROUNDING;
-        // Rounding the sum must not undo it.
-        let (above, below) = (origin + slack, origin - slack);
-        let above = [above.x.next_up(), above.y.next_up(), above.z.next_up()];
-        let below = [below.x.next_down(), below.y.next_down(), below.z.next_down()];
+        let (origin, direction) = (Vec3A::from(ray.origin), Vec3A::from(ray.direction));
+        let (min, max) = (Vec3A::from(bounds.min), Vec3A::from(bounds.max));
+        let reach = (min - origin).abs().max((max - origin).abs()).max_element();
+        // Rounding the sum, by half an ulp, must not undo it.
+        let slack = Vec3A::splat(reach * HIT_ROUNDING) + origin.abs() * f32::EPSILON;
+        let (above, below) = ((origin + slack).to_array(), (origin - slack).to_array());
+        let inverses = (Vec3A::ONE / direction).to_array();
         let mut slabs = Self {
             enter: [lanes.splat(0.0); 3],
             leave: [lanes.splat(0.0); 3],
@@ -93,7 +94,7 @@ impl<L: Lanes> Slabs<L> {
             zero: lanes.splat(0.0),
         };
         for axis in 0..3 {
-            let inverse = 1.0 / direction[axis];
+            let inverse = inverses[axis];
             let backwards = inverse < 0.0;
             slabs.enter[axis] = lanes.splat(if backwards { below[axis] } else { above[axis] });
             slabs.leave[axis] = lanes.splat(if backwards { above[axis] } else { below[axis] });
@@ -138,8 +139,29 @@ impl<L: Lanes> Slabs<L> {
     }
 }
 
-/// What waits to be walked, and where the ray enters it.
-type Stack = ArrayVec<(Word, f32), STACK>;
+/// What waits to be walked, and where the ray enters it: the distance's bits, which grow with it as it is never negative,
+/// above the word's. Two are put in order without a branch, which nothing could predict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Waiting(u64);
+
+impl Waiting {
+    #[inline(always)]
+    fn new(word: Word, enter: f32) -> Self {
+        Self(u64::from(enter.to_bits()) << 32 | u64::from(word.bits()))
+    }
+
+    #[inline(always)]
+    fn enter(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
+
+    #[inline(always)]
+    fn word(self) -> Word {
+        Word::from_bits(self.0 as u32)
+    }
+}
+
+type Stack = ArrayVec<Waiting, STACK>;
 
 struct Closest<'a, F> {
     bvh: &'a Bvh,
@@ -166,8 +188,10 @@ impl<F: FnMut(Run, &mut Nearest)> Kernel for Closest<'_, F> {
                     let node = &self.bvh.nodes[index];
                     let (mask, enter) = slabs.meets(lanes, node, lanes.splat(nearest.t));
                     if mask & mask.wrapping_sub(1) != 0 {
-                        push_sorted(&mut stack, node, mask, &lanes.store(enter));
-                    } else if mask != 0 {
+                        word = nearest_of(&mut stack, node, mask, &lanes.store(enter)).word();
+                        continue;
+                    }
+                    if mask != 0 {
                         word = node.children[mask.trailing_zeros() as usize % 8];
                         continue;
                     }
@@ -180,7 +204,7 @@ impl<F: FnMut(Run, &mut Nearest)> Kernel for Closest<'_, F> {
             word = loop {
                 match stack.pop() {
                     None => return nearest,
-                    Some((word, enter)) if enter <= nearest.t => break word,
+                    Some(waiting) if waiting.enter() <= nearest.t => break waiting.word(),
                     Some(_) => {}
                 }
             };
@@ -188,22 +212,33 @@ impl<F: FnMut(Run, &mut Nearest)> Kernel for Closest<'_, F> {
     }
 }
 
-/// Pushes the children of a mask, nearest last.
+/// The nearest of a mask's children, of which there are two at least; pushes the others, the nearest of them last.
 #[inline(always)]
-fn push_sorted(stack: &mut Stack, node: &Node, mut mask: u32, enter: &Column) {
-    let base = stack.len();
-    while mask != 0 {
+fn nearest_of(stack: &mut Stack, node: &Node, mut mask: u32, enter: &Column) -> Waiting {
+    let mut next = || {
         let lane = mask.trailing_zeros() as usize % 8;
         mask &= mask - 1;
-        let item = (node.children[lane], enter[lane]);
-        stack.push(item);
-        let mut at = stack.len() - 1;
-        while at > base && stack[at - 1].1 < item.1 {
+        (Waiting::new(node.children[lane], enter[lane]), mask)
+    };
+    let in_order = |a: Waiting, b: Waiting| (a.min(b), a.max(b));
+    let (a, (b, mut rest)) = (next().0, next());
+    let (mut nearest, farther) = in_order(a, b);
+    let base = stack.len();
+    stack.push(farther);
+    while rest != 0 {
+        let (child, after) = next();
+        rest = after;
+        let farther;
+        (nearest, farther) = in_order(nearest, child);
+        let mut at = stack.len();
+        stack.push(farther);
+        while at > base && stack[at - 1] < farther {
             stack[at] = stack[at - 1];
             at -= 1;
         }
-        stack[at] = item;
+        stack[at] = farther;
     }
+    nearest
 }
 
 struct Any<'a, F> {
@@ -230,9 +265,13 @@ impl<F: FnMut(Run) -> bool> Kernel for Any<'_, F> {
                 Child::Node(index) => {
                     let node = &self.bvh.nodes[index];
                     let (mut mask, _) = slabs.meets(lanes, node, t_max);
-                    while mask != 0 {
+                    while mask & mask.wrapping_sub(1) != 0 {
                         stack.push(node.children[mask.trailing_zeros() as usize % 8]);
                         mask &= mask - 1;
+                    }
+                    if mask != 0 {
+                        word = node.children[mask.trailing_zeros() as usize % 8];
+                        continue;
                     }
                 }
                 Child::Packet(index) => {
