@@ -139,6 +139,19 @@ impl Effort {
     }
 }
 
+impl Effort {
+    /// As many samples and paths in all, the same number for every pixel.
+    #[must_use]
+    pub fn evened(mut self) -> Self {
+        for counts in [&mut self.samples, &mut self.paths].into_iter().filter(|counts| !counts.is_empty()) {
+            let sum: usize = counts.iter().map(|&n| usize::from(n)).sum();
+            let each = sum.div_ceil(counts.len()).max(1) as u8;
+            counts.fill(each);
+        }
+        self
+    }
+}
+
 impl Measured<'_> {
     /// A round costs at most twice what all eye samples and paths before have cost: no single one overruns a limit of time by
     /// far.

@@ -263,8 +263,9 @@ impl Film {
     #[must_use]
     pub fn new(width: u32, height: u32, caustics: Caustics, layers: usize) -> Self {
         let count = width as usize * height as usize;
-        let (pixels, layers) =
-            (vec![PixelSums::default(); count], vec![LayerSums::default(); count * layers]);
+        // The memory's pages are made on all threads.
+        let pixels = rayon::iter::repeat_n(PixelSums::default(), count).collect();
+        let layers = rayon::iter::repeat_n(LayerSums::default(), count * layers).collect();
         Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels, layers }
     }
 

@@ -25,6 +25,12 @@ impl<'a> Picture<'a> {
         Self { film, footprints, smoothing: Cow::Owned(smooth(film, footprints)) }
     }
 
+    /// The film as it was gathered.
+    #[must_use]
+    pub fn unsmoothed(film: &'a Film, footprints: &'a Footprints) -> Self {
+        Self { film, footprints, smoothing: Cow::Owned(Smoothing::default()) }
+    }
+
     /// A picture whose smoothing is known.
     #[must_use]
     pub fn with_smoothing(film: &'a Film, footprints: &'a Footprints, smoothing: &'a Smoothing) -> Self {
@@ -143,11 +149,16 @@ impl<'a> Picture<'a> {
         let paths = paths * paths + Vec3::splat(bounced.unwrap_or(0.0));
         let radiance = darker.max(value.min(around)).max(Vec3::ZERO);
         let relative = |squares: Vec3| mean_channel(squares / (radiance * radiance + floor * floor));
-        PixelError {
-            sampled: relative(sampled * sampled),
-            paths: relative(paths),
-            photons: relative(photons),
-        }
+        let (sampled, paths, photons) = (relative(sampled * sampled), relative(paths), relative(photons));
+        // Of what is smoothed the estimate is a mean over many pixels, and the noise is that of all within the filter.
+        let spread = |error: f32, smoothed: &Option<Smoothed>| match smoothed {
+            Some(smoothed) if smoothed.squared_error[index].is_some() => {
+                2.0 * error * error * smoothed.alike(index)
+            }
+            _ => 2.0 / 3.0 * error * error,
+        };
+        let variance = spread(sampled, &None) + spread(paths, indirect) + spread(photons, caustics);
+        PixelError { sampled, paths, photons, variance }
     }
 }
 
@@ -161,6 +172,9 @@ pub struct PixelError {
     pub paths: f32,
     /// Of what photons bring.
     pub photons: f32,
+    /// Variance of the sum over the picture of what the error truly is, one pixel's share: of a squared normal number it is
+    /// twice its mean's square, or 2/3 of the mean of its own square; as often as pixels share their noise.
+    pub variance: f32,
 }
 
 impl PixelError {
@@ -170,16 +184,15 @@ impl PixelError {
         self.sampled + self.paths + self.photons
     }
 
-    /// Root of the upper end of the mean's one-sided 95 % range: where few pixels hold most of the error, the estimate of
-    /// it is itself uncertain. Pixels count as independent, which smoothed ones are not quite. A pixel's error is a squared normal number, so that its variance is 2/3 of the
-    /// mean of its square.
+    /// Root of the upper end of the mean's one-sided 95 % range: where few pixels hold most of the error, or many share theirs,
+    /// the picture may be luckier or less lucky than its halves' difference says. Both vary, independently, by the same amount.
     #[must_use]
     pub fn bound(errors: &[Self]) -> f32 {
         /// Standard deviations above the mean that 5 % of a normal distribution exceed.
         const ONE_SIDED_95: f64 = 1.645;
         let sum: f64 = errors.iter().map(|e| f64::from(e.total())).sum();
-        let squares: f64 = errors.iter().map(|e| f64::from(e.total()).powi(2)).sum();
-        ((sum + ONE_SIDED_95 * (squares * 2.0 / 3.0).sqrt()) / errors.len().max(1) as f64).sqrt() as f32
+        let variance: f64 = errors.iter().map(|e| f64::from(e.variance)).sum();
+        ((sum + ONE_SIDED_95 * (2.0 * variance).sqrt()) / errors.len().max(1) as f64).sqrt() as f32
     }
 }
 

@@ -151,6 +151,8 @@ pub struct Render {
     effort: Effort,
     /// Estimated then.
     error: Option<f32>,
+    /// Whether all pixels get the same number of samples.
+    even: bool,
 }
 
 /// With no limit given at all, this many rounds end a render that never reaches its error.
@@ -167,6 +169,8 @@ impl Render {
             LinearImage { width: scene.image.width, height: scene.image.height, pixels: Vec::new() };
         let film =
             Film::new(scene.image.width, scene.image.height, scene.render.caustics, plan.layer_names.len());
+        // Single paths that meet a light decide badly on how many follow them.
+        let backward = scene.render.caustics == Caustics::Backward;
         let windows = vec![Tally::default(); plan.photons.len()];
         let time = PassTime::default();
         Self {
@@ -184,7 +188,16 @@ impl Render {
             smoothing: None,
             preview,
             effort: Effort::default(),
+            even: backward,
         }
+    }
+
+    /// Gives all pixels the same number of samples and smooths nothing, which costs time and buys a mean without bias after any
+    /// number of rounds: samples that decide on how many follow them count for less where they were bright. For references;
+    /// a checkpoint does not keep it. Path tracing, `"caustics": "backward"`, is always even.
+    #[must_use]
+    pub fn evenly(self) -> Self {
+        Self { even: true, ..self }
     }
 
     /// Renders the next round, in the rayon pool this is called in.
@@ -216,7 +229,7 @@ impl Render {
             connected.add_to(&mut film);
             eye.eye_rays += connected.rays;
         }
-        if round == 0 && !self.plan.photons.is_empty() {
+        if round == 0 && !self.plan.photons.is_empty() && !self.even {
             let mut first = self.film.clone();
             first.add_round(film, blocks.count as f32);
             self.film = self.look_again(first, sent.photons.as_ref(), &mut eye, control)?;
@@ -249,7 +262,7 @@ impl Render {
                 self.smoothable = smoothable(&self.footprints);
             }
         }
-        if self.rounds() == 0 {
+        if self.rounds() == 0 && !self.even {
             self.effort = Effort::first(&self.smoothable, (self.film.size().0, self.scene.render.seed));
         }
     }

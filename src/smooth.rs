@@ -46,6 +46,14 @@ pub struct Smoothed {
     level: Vec<u8>,
 }
 
+impl Smoothed {
+    /// How many pixels share the noise of this one.
+    #[must_use]
+    pub fn alike(&self, pixel: usize) -> f32 {
+        ladder::alike(self.level[pixel])
+    }
+}
+
 /// A kind of light that is smoothed: irradiance of the pixels' footprints, or radiance of pixels without one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gathered {

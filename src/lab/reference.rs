@@ -91,7 +91,7 @@ pub fn measure_reference(subject: &Subject<'_>, task: Task, budget: Budget) -> R
     let mask = if task == Task::Complete { without_lamps(subject)? } else { None };
     let mut trials = Vec::new();
     for (name, settings) in estimators(subject, task)? {
-        let mut timed = Timed::new(subject.scene(&settings, SEED)?);
+        let mut timed = Timed::evenly(subject.scene(&settings, SEED)?);
         run(&mut timed, TRIAL * budget.reference)?;
         trials.push((name, summary(&timed, mask.as_deref())?, timed));
     }

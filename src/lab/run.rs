@@ -110,6 +110,12 @@ impl Timed {
         Self { render: Render::new(scene, plan), cpu, control: Control::new() }
     }
 
+    /// The same, without bias after any number of rounds.
+    pub(super) fn evenly(scene: Scene) -> Self {
+        let timed = Self::new(scene);
+        Self { render: timed.render.evenly(), ..timed }
+    }
+
     /// Renders up to the next round at which the product itself would look.
     pub(super) fn run_to_milestone(&mut self) -> Result<(), RenderError> {
         let start = ProcessTime::now();

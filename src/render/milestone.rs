@@ -72,13 +72,18 @@ impl Render {
         if !is_milestone(self.rounds()) {
             return;
         }
-        let picture = Picture::new(&self.film, &self.footprints);
+        let picture = if self.even {
+            Picture::unsmoothed(&self.film, &self.footprints)
+        } else {
+            Picture::new(&self.film, &self.footprints)
+        };
         let errors = picture.errors();
         let measured = self.measured(&self.film, &errors, &self.eye);
         let key = hash(self.scene.render.seed, u64::from(self.rounds()));
         // A round at most doubles what was done before: no single one overruns a limit of time by far.
         let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);
-        self.effort = Effort::decide(&measured, most_shift, key);
+        let effort = Effort::decide(&measured, most_shift, key);
+        self.effort = if self.even { effort.evened() } else { effort };
         self.error = Some(PixelError::bound(&errors));
         self.preview = picture.image();
         self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));

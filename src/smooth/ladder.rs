@@ -42,9 +42,19 @@ impl Level {
         self.boxes.iter().map(|&b| (((2 * b + 1).pow(2) - 1) as f32) / 12.0).sum()
     }
 
+    /// How many pixels share their noise: those that a Gaussian of this variance weighs as if alike, 4πσ².
+    fn alike(self) -> f32 {
+        (4.0 * std::f32::consts::PI * self.variance()).max(1.0)
+    }
+
     fn reach(self) -> usize {
         self.boxes.iter().sum()
     }
+}
+
+/// How many pixels share the noise of one that was smoothed at this width.
+pub(super) fn alike(level: u8) -> f32 {
+    LEVELS[usize::from(level)].alike()
 }
 
 /// Half widths of the windows over which noise and blur are averaged, from large to small.

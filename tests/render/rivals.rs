@@ -1,7 +1,9 @@
 //! Caustics by other estimators: path tracing that meets the light, and photons connected to the eye, agree with the
 //! photon map where all can converge.
 
-use crate::support::{Estimate, T_LIMIT, camera_above, compile, floor, mean, over_seeds, render, scene};
+use crate::support::{
+    Estimate, SEEDS, T_LIMIT, camera_above, compile, floor, mean, over_seeds, render, scene,
+};
 use nephroid::light_path::PathClass;
 use nephroid::pass1_light::{Block, Window, trace_block, windows};
 use nephroid::plan::Plan;
@@ -158,6 +160,21 @@ fn path_tracing_and_photons_agree_on_indirect_light() {
     assert!(T_LIMIT * error < 0.05 * a.mean, "{a:?} {b:?}");
     // Photons are looked up over eight pixels' widths there: the blur of a caustic's rim costs a little.
     assert!((a.mean - b.mean).abs() <= T_LIMIT * error + 2e-3 * a.mean, "{a:?} {b:?}");
+}
+
+/// Path tracing gives every pixel the same number of samples: if those that meet the light decided on how many follow them,
+/// they would count for less, and three rounds lose 60 % of the light here.
+#[test]
+fn path_tracing_is_right_in_the_mean_after_few_rounds() {
+    let mut value = beside_a_ball();
+    value["lights"] = json!([large_light([1.2, 3.0, 0.6], 1.2)]);
+    let truth = estimate("photons", &value, PathClass::Caustic, PHOTONS);
+    value["render"]["caustics"] = json!("backward");
+    let seen = |seed| mean(&render(&value, seed, 3, 8).raw_layer(PathClass::Caustic));
+    let found = Estimate::of(&(0..6 * SEEDS).map(seen).collect::<Vec<_>>());
+    let error = found.standard_error.hypot(truth.standard_error);
+    assert!(T_LIMIT * error < 0.5 * truth.mean, "too noisy: {found:?} {truth:?}");
+    assert!((found.mean - truth.mean).abs() <= T_LIMIT * error, "{found:?} {truth:?}");
 }
 
 /// Flux that lands on the floor within 1 m of the middle, over seeds.
