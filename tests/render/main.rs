@@ -35,6 +35,7 @@ mod pixelwise;
 mod plan;
 mod reach;
 mod rivals;
+mod sample_scenes;
 mod scales;
 mod scattering;
 mod scene_file;

@@ -87,7 +87,7 @@ fn forward_tracing_and_photons_agree_on_a_glass_ball() {
 
 #[test]
 fn path_tracing_and_photons_agree_in_a_ring() {
-    agrees(&in_a_ring(), "backward", [PHOTONS, paths(64)]);
+    agrees(&in_a_ring(), "backward", [PHOTONS, paths(128)]);
 }
 
 #[test]
