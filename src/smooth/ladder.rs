@@ -143,15 +143,14 @@ impl Ladder {
             .with_max_len(1)
             .map(|level| filter(*level, &raw, &mask, segment.size))
             .collect();
-        // What to choose by is known before the choice from a middling width.
-        let even = weights(segment, samples, |i| levels[3].mean(i), floor);
+        let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
+        let even = weights(segment, samples, before_choice(&levels, &counts), floor);
         let costs = Costs { levels: &levels, weights: &even, mask: &mask };
         let sums: Vec<Cost> = (0..levels.len())
             .into_par_iter()
             .with_max_len(1)
             .map(|level| costs.sums(level, segment.size))
             .collect();
-        let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
         let mut choices = choose(&levels, (&sums, &counts, windows(gathered)), &even);
         // Errors are relative to what was chosen: beside something bright a middling width holds its light, of which a part is
         // many times the darkness there. Where nothing is smoothed a bright sample would hide its own error: it counts for no
@@ -193,6 +192,30 @@ pub(super) fn filter_part(
         let share = shares(*width, &mask, segment.size);
         let filtered = filter_plane(*width, raw.clone(), &share, segment.size);
         chosen().for_each(|&pixel| tell(pixel as usize, filtered[segment.local(pixel)]));
+    }
+}
+
+/// What irradiance errors are relative to before a width is chosen: that of a middling width; or, beside something bright, whose
+/// light that width holds too, that of a narrow one, as far as it is darker by more than its noise.
+fn before_choice<'a>(levels: &'a [Filtered], counts: &Sums) -> impl Fn(usize) -> Vec3 + use<'a> {
+    const MIDDLING: usize = 3;
+    const NARROW: usize = 1;
+    /// Standard deviations of the noise that do not count.
+    const CLEARLY: f32 = 3.0;
+    let size = (counts.width, counts.height);
+    let [a, b] = &levels[NARROW].halves;
+    let squares = a.iter().zip(b).map(|(&a, &b)| f64::from(0.25 * mean_channel((a - b) * (a - b))));
+    let squares = Sums::new(size, squares);
+    let noise = |i: usize| {
+        let at = (i % size.0, i / size.0);
+        (squares.around(at, ESTIMATE) / counts.around(at, ESTIMATE).max(1.0)) as f32
+    };
+    let noise: Vec<f32> = (0..a.len()).map(noise).collect();
+    move |i| {
+        let (middling, narrow) = (levels[MIDDLING].mean(i), levels[NARROW].mean(i));
+        let darker = mean_channel(middling - narrow).max(0.0);
+        let share = 1.0 - CLEARLY * CLEARLY * noise[i] / (darker * darker).max(f32::MIN_POSITIVE);
+        middling.lerp(narrow, share.max(0.0))
     }
 }
 
