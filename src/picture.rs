@@ -105,11 +105,45 @@ impl<'a> Picture<'a> {
         let floor = 0.1 * mean / image.pixels.len() as f32;
         let around = around(&image);
         let pixels = self.film.means().zip(image.pixels.par_iter().zip(around)).enumerate();
-        pixels
+        let mut errors: Vec<PixelError> = pixels
             .map(|(i, (means, (value, around)))| {
                 self.error(i, &means, (Vec3::from_array(*value), around), floor)
             })
-            .collect()
+            .collect();
+        self.share_noise(&mut errors);
+        errors
+    }
+
+    /// Adds to the variance what smoothed pixels share: the errors of two are alike within the filter's reach, and their product
+    /// counts. Those of its neighbours are in the mean those of a square around a pixel.
+    fn share_noise(&self, errors: &mut [PixelError]) {
+        const REACH: usize = 6;
+        let Smoothing { photons, indirect } = &*self.smoothing;
+        let (width, height) = self.film.size();
+        for (smoothed, error) in
+            [(photons, (|e| e.photons) as fn(&PixelError) -> f32), (indirect, |e| e.paths)]
+        {
+            let Some(smoothed) = smoothed else { continue };
+            let of = |i: usize| smoothed.squared_error[i].map_or(0.0, |_| f64::from(error(&errors[i])));
+            let stride = width + 1;
+            let mut sums = vec![0.0_f64; stride * (height + 1)];
+            for i in 0..errors.len() {
+                let here = (i / width + 1) * stride + i % width + 1;
+                sums[here] = of(i) + sums[here - 1] + sums[here - stride] - sums[here - stride - 1];
+            }
+            for (i, pixel) in
+                errors.iter_mut().enumerate().filter(|(i, _)| smoothed.squared_error[*i].is_some())
+            {
+                let (x, y) = (i % width, i / width);
+                let (x0, y0) = (x.saturating_sub(REACH), y.saturating_sub(REACH));
+                let (x1, y1) = ((x + REACH + 1).min(width), (y + REACH + 1).min(height));
+                let sum = sums[y1 * stride + x1] + sums[y0 * stride + x0]
+                    - sums[y1 * stride + x0]
+                    - sums[y0 * stride + x1];
+                let around = (sum / ((x1 - x0) * (y1 - y0)) as f64).max(0.0) as f32;
+                pixel.variance += 2.0 * smoothed.alike(i) * error(pixel) * around;
+            }
+        }
     }
 
     /// The radiance that an error is relative to must not hold the error itself, or a single bright sample would never
@@ -150,14 +184,8 @@ impl<'a> Picture<'a> {
         let radiance = darker.max(value.min(around)).max(Vec3::ZERO);
         let relative = |squares: Vec3| mean_channel(squares / (radiance * radiance + floor * floor));
         let (sampled, paths, photons) = (relative(sampled * sampled), relative(paths), relative(photons));
-        // Of what is smoothed the estimate is a mean over many pixels, and the noise is that of all within the filter.
-        let spread = |error: f32, smoothed: &Option<Smoothed>| match smoothed {
-            Some(smoothed) if smoothed.squared_error[index].is_some() => {
-                2.0 * error * error * smoothed.alike(index)
-            }
-            _ => 2.0 / 3.0 * error * error,
-        };
-        let variance = spread(sampled, &None) + spread(paths, indirect) + spread(photons, caustics);
+        let alone = |error: f32, smoothed: Option<f32>| if smoothed.is_some() { 0.0 } else { error * error };
+        let variance = 2.0 / 3.0 * (sampled * sampled + alone(paths, bounced) + alone(photons, smoothed));
         PixelError { sampled, paths, photons, variance }
     }
 }
