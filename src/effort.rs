@@ -137,9 +137,7 @@ impl Effort {
             paths: paths.map_or_else(Vec::new, scaled),
         }
     }
-}
 
-impl Effort {
     /// As many samples and paths in all, the same number for every pixel.
     #[must_use]
     pub fn evened(mut self) -> Self {

@@ -196,8 +196,8 @@ impl RoundFilm {
     pub(crate) fn new(width: u32, height: u32, layers: usize) -> Self {
         let count = width as usize * height as usize;
         // In parallel, as it is the first to touch the memory.
-        let pixels = (0..count).into_par_iter().map(|_| PixelSums::default()).collect();
-        let layers = (0..count * layers).into_par_iter().map(|_| LayerSums::default()).collect();
+        let pixels = rayon::iter::repeat_n(PixelSums::default(), count).collect();
+        let layers = rayon::iter::repeat_n(LayerSums::default(), count * layers).collect();
         Self { width, pixels, layers }
     }
 
@@ -263,7 +263,7 @@ impl Film {
     #[must_use]
     pub fn new(width: u32, height: u32, caustics: Caustics, layers: usize) -> Self {
         let count = width as usize * height as usize;
-        // The memory's pages are made on all threads.
+        // In parallel, as for a round.
         let pixels = rayon::iter::repeat_n(PixelSums::default(), count).collect();
         let layers = rayon::iter::repeat_n(LayerSums::default(), count * layers).collect();
         Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels, layers }

@@ -114,34 +114,16 @@ impl<'a> Picture<'a> {
         errors
     }
 
-    /// Adds to the variance what smoothed pixels share: the errors of two are alike within the filter's reach, and their product
-    /// counts. Those of its neighbours are in the mean those of a square around a pixel.
+    /// Adds to the variance what smoothed pixels share: twice the products of the errors of any two whose noise is alike.
     fn share_noise(&self, errors: &mut [PixelError]) {
-        const REACH: usize = 6;
+        type Part = fn(&PixelError) -> f32;
         let Smoothing { photons, indirect } = &*self.smoothing;
-        let (width, height) = self.film.size();
-        for (smoothed, error) in
-            [(photons, (|e| e.photons) as fn(&PixelError) -> f32), (indirect, |e| e.paths)]
-        {
+        let parts: [(_, Part); 2] = [(photons, |e| e.photons), (indirect, |e| e.paths)];
+        for (smoothed, part) in parts {
             let Some(smoothed) = smoothed else { continue };
-            let of = |i: usize| smoothed.squared_error[i].map_or(0.0, |_| f64::from(error(&errors[i])));
-            let stride = width + 1;
-            let mut sums = vec![0.0_f64; stride * (height + 1)];
-            for i in 0..errors.len() {
-                let here = (i / width + 1) * stride + i % width + 1;
-                sums[here] = of(i) + sums[here - 1] + sums[here - stride] - sums[here - stride - 1];
-            }
-            for (i, pixel) in
-                errors.iter_mut().enumerate().filter(|(i, _)| smoothed.squared_error[*i].is_some())
-            {
-                let (x, y) = (i % width, i / width);
-                let (x0, y0) = (x.saturating_sub(REACH), y.saturating_sub(REACH));
-                let (x1, y1) = ((x + REACH + 1).min(width), (y + REACH + 1).min(height));
-                let sum = sums[y1 * stride + x1] + sums[y0 * stride + x0]
-                    - sums[y1 * stride + x0]
-                    - sums[y0 * stride + x1];
-                let around = (sum / ((x1 - x0) * (y1 - y0)) as f64).max(0.0) as f32;
-                pixel.variance += 2.0 * smoothed.alike(i) * error(pixel) * around;
+            let sharing = smoothed.sharing(self.film.size(), |i| part(&errors[i]));
+            for (error, sharing) in errors.iter_mut().zip(sharing) {
+                error.variance += 2.0 * part(error) * sharing;
             }
         }
     }

@@ -15,6 +15,7 @@
 
 mod ladder;
 mod segment;
+mod sums;
 
 use crate::film::{Film, PixelMeans};
 use crate::light_path::PathClass;
@@ -24,6 +25,7 @@ use glam::Vec3;
 use ladder::Ladder;
 use rayon::prelude::*;
 use segment::Segment;
+use sums::Sums;
 
 /// What smoothing does to a film.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,10 +49,23 @@ pub struct Smoothed {
 }
 
 impl Smoothed {
-    /// How many pixels share the noise of this one.
+    /// For every pixel the sum of the errors that share its noise, those of the smoothed pixels within its filter's reach: as many
+    /// as it holds, each the mean of those around. 0 where nothing is smoothed.
     #[must_use]
-    pub fn alike(&self, pixel: usize) -> f32 {
-        ladder::alike(self.level[pixel])
+    pub fn sharing(&self, size: (usize, usize), error: impl Fn(usize) -> f32) -> Vec<f32> {
+        /// Half width of the square around a pixel.
+        const AROUND: usize = 6;
+        let smoothed = |i: usize| self.squared_error[i].is_some();
+        let plane = |value: &dyn Fn(usize) -> f64| {
+            Sums::new(size, (0..self.level.len()).map(|i| if smoothed(i) { value(i) } else { 0.0 }))
+        };
+        let (errors, counts) = (plane(&|i| error(i).into()), plane(&|_| 1.0));
+        let of = |i: usize| {
+            let at = (i % size.0, i / size.0);
+            let mean = errors.around(at, AROUND) / counts.around(at, AROUND);
+            if smoothed(i) { ladder::alike(self.level[i]) * mean.max(0.0) as f32 } else { 0.0 }
+        };
+        (0..self.level.len()).into_par_iter().map(of).collect()
     }
 }
 

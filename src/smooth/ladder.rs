@@ -1,6 +1,7 @@
 //! The ladder of widths over one segment, and the choice between them.
 
 use super::segment::Segment;
+use super::sums::Sums;
 use super::{Gathered, Sample, mean_channel};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -103,13 +104,6 @@ impl Filtered {
     }
 }
 
-/// Sums over rectangles of a plane in constant time.
-struct Sums {
-    width: usize,
-    height: usize,
-    table: Vec<f64>,
-}
-
 /// What a width is estimated to cost, as sums over windows.
 struct Cost {
     bias: Sums,
@@ -202,7 +196,7 @@ fn before_choice<'a>(levels: &'a [Filtered], counts: &Sums) -> impl Fn(usize) ->
     const NARROW: usize = 1;
     /// Standard deviations of the noise that do not count.
     const CLEARLY: f32 = 3.0;
-    let size = (counts.width, counts.height);
+    let size = counts.size();
     let [a, b] = &levels[NARROW].halves;
     let squares = a.iter().zip(b).map(|(&a, &b)| f64::from(0.25 * mean_channel((a - b) * (a - b))));
     let squares = Sums::new(size, squares);
@@ -270,7 +264,7 @@ fn choose(
     (costs, counts, windows): (&[Cost], &Sums, &[usize]),
     weights: &[f32],
 ) -> Vec<Choice> {
-    let (width, height) = (counts.width, counts.height);
+    let (width, height) = counts.size();
     let widest = &levels[levels.len() - 1].halves;
     let lit = |i: usize| weights[i] > 0.0 && (widest[0][i] != Vec3::ZERO || widest[1][i] != Vec3::ZERO);
     let row_pairs: Vec<Vec<Choice>> = (0..height.div_ceil(2))
@@ -303,7 +297,7 @@ fn choose(
 /// The errors of what was chosen, averaged around each pixel: what decided on the width looked at the dearest of many
 /// estimates, and would promise too large an error.
 fn estimate(choices: &mut [Choice], costs: &Costs<'_>, counts: &Sums) {
-    let size = (counts.width, counts.height);
+    let size = counts.size();
     let at: Vec<(f32, f32)> =
         choices.iter().enumerate().map(|(i, c)| costs.at(usize::from(c.level), i)).collect();
     let bias = Sums::new(size, at.iter().map(|c| f64::from(c.0)));
@@ -384,28 +378,5 @@ fn running_sum(plane: &mut [Vec3], line: &mut [Vec3], half: usize, at: impl Fn(u
         if k >= half {
             sum -= line[k - half].as_dvec3();
         }
-    }
-}
-
-impl Sums {
-    fn new((width, height): (usize, usize), values: impl Iterator<Item = f64>) -> Self {
-        let stride = width + 1;
-        let mut table = vec![0.0; stride * (height + 1)];
-        for (i, value) in values.enumerate() {
-            let (x, y) = (i % width, i / width);
-            let here = (y + 1) * stride + x + 1;
-            table[here] = value + table[here - 1] + table[here - stride] - table[here - stride - 1];
-        }
-        Self { width, height, table }
-    }
-
-    /// Sum over the square of `half` pixels around a pixel, clipped to the box.
-    #[inline]
-    fn around(&self, (x, y): (usize, usize), half: usize) -> f64 {
-        let stride = self.width + 1;
-        let (x0, y0) = (x.saturating_sub(half), y.saturating_sub(half));
-        let (x1, y1) = ((x + half + 1).min(self.width), (y + half + 1).min(self.height));
-        let at = |x: usize, y: usize| self.table[y * stride + x];
-        at(x1, y1) - at(x0, y1) - at(x1, y0) + at(x0, y0)
     }
 }
