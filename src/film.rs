@@ -183,63 +183,66 @@ impl PixelSums {
     }
 }
 
-/// One round's estimate of every pixel, row by row from the top.
+/// A square of pixels, or less at the right and at the bottom, in which a round is made; row by row.
+pub struct Tile {
+    /// What each pixel has gathered.
+    pub(crate) pixels: Vec<PixelSums>,
+    /// The named layers of each, one pixel after the other.
+    pub(crate) layers: Vec<LayerSums>,
+}
+
+/// One round's estimate of every pixel, in tiles, row by row from the top.
 pub struct RoundFilm {
-    width: u32,
-    pixels: Vec<PixelSums>,
-    /// As in [`Film`].
-    layers: Vec<LayerSums>,
+    width: usize,
+    side: usize,
+    tiles: Vec<Tile>,
 }
 
 impl RoundFilm {
-    /// With this many named layers.
-    pub(crate) fn new(width: u32, height: u32, layers: usize) -> Self {
-        let count = width as usize * height as usize;
-        // In parallel, as it is the first to touch the memory.
-        let pixels = rayon::iter::repeat_n(PixelSums::default(), count).collect();
-        let layers = rayon::iter::repeat_n(LayerSums::default(), count * layers).collect();
-        Self { width, pixels, layers }
-    }
-
-    /// Puts square tiles of this side, or less at the right and at the bottom, row by row, as are their pixels.
-    pub(crate) fn put_tiles<T: Sync>(
-        &mut self,
-        side: u32,
-        tiles: &[T],
-        sums: impl Fn(&T) -> (&[PixelSums], &[LayerSums]) + Sync,
-    ) {
-        let (width, side) = (self.width as usize, side as usize);
-        let each = self.layers.len() / self.pixels.len();
-        put_tiles(&mut self.pixels, (width, side, side), tiles, |tile| sums(tile).0);
-        if each > 0 {
-            put_tiles(&mut self.layers, (width * each, side * each, side), tiles, |tile| sums(tile).1);
-        }
+    /// Of tiles of this side.
+    pub(crate) fn new(width: u32, side: u32, tiles: Vec<Tile>) -> Self {
+        Self { width: width as usize, side: side as usize, tiles }
     }
 
     /// Adds to the caustic class of one half; row by row.
     pub(crate) fn add_caustics(&mut self, half: usize, radiance: &[DVec3]) {
-        for (pixel, radiance) in self.pixels.iter_mut().zip(radiance) {
-            pixel.halves[half].classes.add(PathClass::Caustic, radiance.as_vec3());
+        for (index, radiance) in radiance.iter().enumerate() {
+            let (tile, pixel) = self.place(index);
+            let sums = &mut self.tiles[tile].pixels[pixel].halves[half];
+            sums.classes.add(PathClass::Caustic, radiance.as_vec3());
         }
     }
-}
 
-/// Puts tiles into rows of `row` values; a tile has `across` to a row, and `down` rows.
-fn put_tiles<T: Sync, V: Copy + Send>(
-    values: &mut [V],
-    (row, across, down): (usize, usize, usize),
-    tiles: &[T],
-    of: impl Fn(&T) -> &[V] + Sync,
-) {
-    let bands = values.par_chunks_mut(row * down).zip(tiles.par_chunks(row.div_ceil(across)));
-    bands.for_each(|(band, tiles)| {
-        for (tile, start) in tiles.iter().zip((0..row).step_by(across)) {
-            let width = across.min(row - start);
-            for (line, from) in band.chunks_exact_mut(row).zip(of(tile).chunks_exact(width)) {
-                line[start..start + width].copy_from_slice(from);
-            }
+    /// The tile that holds a pixel of the picture, and the pixel's place in it.
+    fn place(&self, index: usize) -> (usize, usize) {
+        let (width, side) = (self.width, self.side);
+        let (x, y) = (index % width, index / width);
+        let across = side.min(width - x / side * side);
+        (y / side * width.div_ceil(side) + x / side, y % side * across + x % side)
+    }
+
+    /// Adds tiles' values to those of the picture, of which each pixel has `each`.
+    fn add_to<V: Send, T: Sync>(
+        &self,
+        sums: &mut [V],
+        each: usize,
+        of: impl Fn(&Tile) -> &[T] + Sync,
+        add: impl Fn(&mut V, &T) + Sync,
+    ) {
+        let (row, side) = (self.width * each, self.side * each);
+        if row == 0 {
+            return;
         }
-    });
+        let bands = sums.par_chunks_mut(row * self.side).zip(self.tiles.par_chunks(row.div_ceil(side)));
+        bands.for_each(|(band, tiles)| {
+            for (tile, start) in tiles.iter().zip((0..row).step_by(side)) {
+                let across = side.min(row - start);
+                for (line, from) in band.chunks_exact_mut(row).zip(of(tile).chunks_exact(across)) {
+                    line[start..start + across].iter_mut().zip(from).for_each(|(sum, value)| add(sum, value));
+                }
+            }
+        });
+    }
 }
 
 /// The sum of finished rounds. Rounds are added in their order, one after the other, so that the same rounds
@@ -263,7 +266,7 @@ impl Film {
     #[must_use]
     pub fn new(width: u32, height: u32, caustics: Caustics, layers: usize) -> Self {
         let count = width as usize * height as usize;
-        // In parallel, as for a round.
+        // In parallel, as it is the first to touch the memory.
         let pixels = rayon::iter::repeat_n(PixelSums::default(), count).collect();
         let layers = rayon::iter::repeat_n(LayerSums::default(), count * layers).collect();
         Self { width, height, rounds: 0, caustics, photon_weight: 0.0, pixels, layers }
@@ -276,25 +279,27 @@ impl Film {
     }
 
     /// Adds the next round, whose photons count `photon_weight` times those of the first.
-    pub fn add_round(&mut self, round: RoundFilm, photon_weight: f32) {
+    pub fn add_round(&mut self, round: &RoundFilm, photon_weight: f32) {
         self.rounds += 1;
         self.add(round, photon_weight);
     }
 
     /// Adds eye samples to the last round.
-    pub fn add_samples(&mut self, samples: RoundFilm) {
+    pub fn add_samples(&mut self, samples: &RoundFilm) {
         self.add(samples, 0.0);
     }
 
-    fn add(&mut self, mut round: RoundFilm, photon_weight: f32) {
+    fn add(&mut self, round: &RoundFilm, photon_weight: f32) {
         self.photon_weight += photon_weight;
-        let caustics = self.caustics;
-        self.pixels.par_iter_mut().zip(&mut round.pixels).for_each(|(sum, pixel)| {
+        let (caustics, each) = (self.caustics, self.layers.len() / self.pixels.len().max(1));
+        let add = |sum: &mut PixelSums, pixel: &PixelSums| {
+            let mut pixel = *pixel;
             pixel.weigh_photons(photon_weight, caustics);
-            sum.add(pixel);
-        });
-        let layers = self.layers.par_iter_mut().zip(&round.layers);
-        layers.for_each(|(sum, layer)| sum.add(layer, photon_weight));
+            sum.add(&pixel);
+        };
+        round.add_to(&mut self.pixels, 1, |tile| &tile.pixels, add);
+        let add = |sum: &mut LayerSums, layer: &LayerSums| sum.add(layer, photon_weight);
+        round.add_to(&mut self.layers, each, |tile| &tile.layers, add);
     }
 
     /// Means of every pixel, row by row.

@@ -10,7 +10,7 @@ use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::radius::RadiusRule;
 use crate::sampling::{SamplePoint, hash};
-use crate::scene::{Caustics, Scene};
+use crate::scene::{Caustics, ImageSettings, Scene};
 use crate::smooth::{Smoothing, smoothable};
 use cpu_time::ProcessTime;
 use std::sync::Arc;
@@ -161,14 +161,18 @@ const MOST_ROUNDS: u32 = 1 << 20;
 /// Fewer rounds tell too little about the error to stop by it.
 const LEAST_ROUNDS: u32 = 2;
 
+fn blank_film(scene: &Scene, plan: &Plan) -> Film {
+    let ImageSettings { width, height, .. } = scene.image;
+    Film::new(width, height, scene.render.caustics, plan.layer_names.len())
+}
+
 impl Render {
     /// A render that has yet to start.
     #[must_use]
     pub fn new(scene: Arc<Scene>, plan: Plan) -> Self {
         let preview =
             LinearImage { width: scene.image.width, height: scene.image.height, pixels: Vec::new() };
-        let film =
-            Film::new(scene.image.width, scene.image.height, scene.render.caustics, plan.layer_names.len());
+        let film = blank_film(&scene, &plan);
         // Single paths that meet a light decide badly on how many follow them.
         let backward = scene.render.caustics == Caustics::Backward;
         let windows = vec![Tally::default(); plan.photons.len()];
@@ -230,11 +234,17 @@ impl Render {
             eye.eye_rays += connected.rays;
         }
         if round == 0 && !self.plan.photons.is_empty() && !self.even {
-            let mut first = self.film.clone();
-            first.add_round(film, blocks.count as f32);
-            self.film = self.look_again(first, sent.photons.as_ref(), &mut eye, control)?;
+            self.film.add_round(&film, blocks.count as f32);
+            drop(film);
+            match self.look_again(sent.photons.as_ref(), &mut eye, control) {
+                Ok(more) => self.film.add_samples(&more),
+                Err(error) => {
+                    self.film = blank_film(&self.scene, &self.plan);
+                    return Err(error);
+                }
+            }
         } else {
-            self.film.add_round(film, blocks.count as f32);
+            self.film.add_round(&film, blocks.count as f32);
         }
         self.blocks = blocks.first + blocks.count;
         self.eye.add(&eye);

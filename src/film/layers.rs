@@ -1,6 +1,6 @@
 //! The named layers of a film: parts of the picture that are summed beside it.
 
-use super::{Film, PixelSums, RoundFilm};
+use super::{Film, PixelSums, RoundFilm, Tile};
 use crate::image_io::LinearImage;
 use crate::smooth::Gathered;
 use glam::{DVec3, Vec3};
@@ -63,9 +63,11 @@ impl LayerSums {
 impl RoundFilm {
     /// Adds what photons connected to the eye bring to a layer, in either half; row by row.
     pub(crate) fn add_to_layer(&mut self, layer: usize, radiance: &[DVec3]) {
-        let each = self.layers.len() / self.pixels.len();
-        for (sums, radiance) in self.layers.chunks_exact_mut(each).zip(radiance) {
-            sums[layer].looked_up += radiance.as_vec3();
+        for (index, radiance) in radiance.iter().enumerate() {
+            let (tile, pixel) = self.place(index);
+            let Tile { pixels, layers } = &mut self.tiles[tile];
+            let each = layers.len() / pixels.len();
+            layers[pixel * each + layer].looked_up += radiance.as_vec3();
         }
     }
 }

@@ -16,7 +16,7 @@ pub use specular::EyeCounts;
 pub use spread::Irradiance;
 
 use crate::effort::Effort;
-use crate::film::{Film, LayerSums, PixelSums, RoundFilm};
+use crate::film::{Film, PixelSums, RoundFilm, Tile};
 use crate::light_path::{Kind, PICTURE, PathClass, Pictures};
 use crate::pass1_light::{RoundPhotons, Spread};
 use crate::photon_map::PhotonMap;
@@ -76,17 +76,10 @@ pub fn trace_image(
             traced
         })
         .collect::<Result<Vec<_>, RenderError>>()?;
-    let mut film = RoundFilm::new(image.width, image.height, context.plan.layer_names.len());
     let mut counts = EyeCounts::default();
-    tiles.iter().for_each(|tile| counts.add(&tile.counts));
-    film.put_tiles(TILE, &tiles, |tile| (&tile.pixels, &tile.layers));
-    Ok((film, counts))
-}
-
-struct Tile {
-    pixels: Vec<PixelSums>,
-    layers: Vec<LayerSums>,
-    counts: EyeCounts,
+    tiles.iter().for_each(|(_, of_tile)| counts.add(of_tile));
+    let tiles = tiles.into_iter().map(|(tile, _)| tile).collect();
+    Ok((RoundFilm::new(image.width, TILE, tiles), counts))
 }
 
 /// What photons bring to the pixels that see them directly, and the pictures that hold it.
@@ -107,7 +100,7 @@ fn trace_tile(
     context: &EyeContext<'_>,
     direct: Option<&[Vec<Seen>; 2]>,
     (x, y): (u32, u32),
-) -> Result<Tile, RenderError> {
+) -> Result<(Tile, EyeCounts), RenderError> {
     let image = context.scene.image;
     let (width, height) = (TILE.min(image.width - x), TILE.min(image.height - y));
     let mut walk = EyeWalk::new(context);
@@ -124,7 +117,7 @@ fn trace_tile(
             layers.extend_from_slice(walk.layers.sums());
         }
     }
-    Ok(Tile { pixels, layers, counts: walk.counts })
+    Ok((Tile { pixels, layers }, walk.counts))
 }
 
 /// One pixel's samples of this round in both halves. Photons are counted on the pixel's footprint; the eye

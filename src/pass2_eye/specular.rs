@@ -236,7 +236,7 @@ impl<'a> EyeWalk<'a> {
             None => camera.ray(raster),
         };
         self.stack.clear();
-        self.stack.push(Branch {
+        let first = Branch {
             ray: ray.at_time(self.time),
             throughput: Vec3::ONE,
             media: self.context.plan.eye_media,
@@ -247,7 +247,8 @@ impl<'a> EyeWalk<'a> {
             main: true,
             scattered: None,
             trail: Trail::default(),
-        });
+        };
+        self.follow(first, sums);
         while let Some(branch) = self.stack.pop() {
             self.follow(branch, sums);
         }

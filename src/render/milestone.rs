@@ -4,7 +4,7 @@ use super::Render;
 use super::RenderError;
 use super::control::Control;
 use crate::effort::{Effort, Measured};
-use crate::film::Film;
+use crate::film::RoundFilm;
 use crate::pass1_light::RoundPhotons;
 use crate::pass2_eye::{self, EyeContext, EyeCounts};
 use crate::picture::{Picture, PixelError};
@@ -18,18 +18,17 @@ pub(crate) fn is_milestone(rounds: u32) -> bool {
 }
 
 impl Render {
-    /// Adds eye samples to the first round where its own find that they are missing: at borders and in half shadows. A
+    /// More eye samples for the first round where its own find that they are missing: at borders and in half shadows. A
     /// whole round more, photons and all, would cost more.
     pub(super) fn look_again(
         &self,
-        mut film: Film,
         photons: Option<&RoundPhotons>,
         eye: &mut EyeCounts,
         control: &Control,
-    ) -> Result<Film, RenderError> {
+    ) -> Result<RoundFilm, RenderError> {
         let smoothing = Smoothing::expected(&self.smoothable);
-        let errors = Picture::with_smoothing(&film, &self.footprints, &smoothing).errors();
-        let measured = self.measured(&film, &errors, eye);
+        let errors = Picture::with_smoothing(&self.film, &self.footprints, &smoothing).errors();
+        let measured = self.measured(&errors, eye);
         let effort = Effort::second_look(&measured, hash(self.scene.render.seed, u64::MAX));
         let context = EyeContext {
             scene: &self.scene,
@@ -38,17 +37,17 @@ impl Render {
             gathers: false,
             round: 0,
             footprints: &self.footprints,
-            film: &film,
+            film: &self.film,
             effort: &effort,
         };
         let (more, counts) = pass2_eye::trace_image(&context, control)?;
-        film.add_samples(more);
         eye.add(&counts);
-        Ok(film)
+        Ok(more)
     }
 
     /// What decides on the effort.
-    fn measured<'a>(&self, film: &Film, errors: &'a [PixelError], eye: &EyeCounts) -> Measured<'a> {
+    fn measured<'a>(&self, errors: &'a [PixelError], eye: &EyeCounts) -> Measured<'a> {
+        let film = &self.film;
         let samples: Vec<u32> = film.pixels().iter().map(|p| p.samples).collect();
         let paths: Vec<u32> = film.pixels().iter().map(|p| p.paths).collect();
         let sampled: u64 = samples.iter().map(|&n| 2 * u64::from(n)).sum();
@@ -78,7 +77,7 @@ impl Render {
             Picture::new(&self.film, &self.footprints)
         };
         let errors = picture.errors();
-        let measured = self.measured(&self.film, &errors, &self.eye);
+        let measured = self.measured(&errors, &self.eye);
         let key = hash(self.scene.render.seed, u64::from(self.rounds()));
         // A round at most doubles what was done before: no single one overruns a limit of time by far.
         let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);

@@ -2,7 +2,7 @@
 
 use crate::scene::QuadLight;
 use glam::{DVec3, Vec2, Vec3};
-use std::f64::consts::PI;
+use std::f64::consts::TAU;
 
 /// A rectangle as seen from a point.
 pub(super) struct SphericalRectangle {
@@ -13,7 +13,8 @@ pub(super) struct SphericalRectangle {
     y: [f64; 2],
     z: f64,
     b: [f64; 2],
-    k: f64,
+    /// Cosine and sine of the angle k at which u = 0 lies.
+    k: [f64; 2],
     /// Steradians.
     pub(super) solid_angle: f32,
 }
@@ -21,13 +22,19 @@ pub(super) struct SphericalRectangle {
 /// Below this solid angle (sr) the angles' sum minus 2π has lost its digits: the rectangle is flat.
 const SMALL: f64 = 1e-9;
 
+/// Of two complex numbers.
+fn product([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
+    [a * c - b * d, a * d + b * c]
+}
+
 impl SphericalRectangle {
     /// `None` where the point lies in the rectangle's plane.
     pub(super) fn new(quad: &QuadLight, from: Vec3) -> Option<Self> {
         let origin = from.as_dvec3();
         let (u, v) = (quad.half_u.as_dvec3(), quad.half_v.as_dvec3());
-        let (width, height) = (2.0 * u.length(), 2.0 * v.length());
-        let (ax, ay) = (u.normalize(), v.normalize());
+        let (half_width, half_height) = (u.length(), v.length());
+        let (width, height) = (2.0 * half_width, 2.0 * half_height);
+        let (ax, ay) = (u / half_width, v / half_height);
         let mut az = ax.cross(ay);
         let corner = quad.center.as_dvec3() - u - v - origin;
         let mut z = corner.dot(az);
@@ -48,11 +55,18 @@ impl SphericalRectangle {
             y[1] / (z * z + y[1] * y[1]).sqrt(),
             -x[0] / (z * z + x[0] * x[0]).sqrt(),
         ];
-        let angle = |a: f64, b: f64| libm::acos((-a * b).clamp(-1.0, 1.0));
-        let g = [angle(nz[0], nz[1]), angle(nz[1], nz[2]), angle(nz[2], nz[3]), angle(nz[3], nz[0])];
+        // The angles of the spherical polygon add up to 2π and the solid angle. As complex numbers of modulus 1 their product
+        // tells the latter by one arc tangent, in place of four arc cosines.
+        let angle = |a: f64, b: f64| {
+            let cosine = -a * b;
+            [cosine, (1.0 - cosine * cosine).max(0.0).sqrt()]
+        };
+        let g23 = product(angle(nz[2], nz[3]), angle(nz[3], nz[0]));
+        let [cosine, sine] = product(product(angle(nz[0], nz[1]), angle(nz[1], nz[2])), g23);
         let b = [nz[0], nz[2]];
-        let k = 2.0 * PI - g[2] - g[3];
-        let mut solid_angle = g[0] + g[1] - k;
+        let k = [g23[0], -g23[1]];
+        let turn = libm::atan2(sine, cosine);
+        let mut solid_angle = if turn < -SMALL { turn + TAU } else { turn };
         if solid_angle < SMALL {
             let middle = quad.center.as_dvec3() - origin;
             let distance2 = middle.length_squared();
@@ -73,8 +87,9 @@ impl SphericalRectangle {
     }
 
     fn warp(&self, u: f64, v: f64) -> (f64, f64) {
-        let angle = u * f64::from(self.solid_angle) + self.k;
-        let f = (libm::cos(angle) * self.b[0] - self.b[1]) / libm::sin(angle);
+        let angle = u * f64::from(self.solid_angle);
+        let [cosine, sine] = product([libm::cos(angle), libm::sin(angle)], self.k);
+        let f = (cosine * self.b[0] - self.b[1]) / sine;
         let mut cu = 1.0 / (f * f + self.b[0] * self.b[0]).sqrt();
         if f < 0.0 {
             cu = -cu;
