@@ -138,15 +138,18 @@ impl Effort {
         }
     }
 
-    /// As many samples and paths in all, the same number for every pixel.
+    /// As many samples and paths, the same number for every pixel, or samples as many times as its share.
     #[must_use]
-    pub fn evened(mut self) -> Self {
-        for counts in [&mut self.samples, &mut self.paths].into_iter().filter(|counts| !counts.is_empty()) {
+    pub fn evened(self, shares: &[u8]) -> Self {
+        let even = |mut counts: Vec<u8>| {
             let sum: usize = counts.iter().map(|&n| usize::from(n)).sum();
-            let each = sum.div_ceil(counts.len()).max(1) as u8;
+            let each = sum.div_ceil(counts.len().max(1)).max(1) as u8;
             counts.fill(each);
-        }
-        self
+            counts
+        };
+        let mut samples = even(self.samples);
+        samples.iter_mut().zip(shares).for_each(|(count, &share)| *count = count.saturating_mul(share));
+        Self { samples, paths: even(self.paths), ..self }
     }
 }
 

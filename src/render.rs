@@ -151,15 +151,14 @@ pub struct Render {
     effort: Effort,
     /// Estimated then.
     error: Option<f32>,
-    /// Whether all pixels get the same number of samples.
+    /// Whether numbers of samples do not follow what the samples find.
     even: bool,
+    /// Then each pixel's, over those of the least; empty means the same for all.
+    shares: Vec<u8>,
 }
 
 /// With no limit given at all, this many rounds end a render that never reaches its error.
 const MOST_ROUNDS: u32 = 1 << 20;
-
-/// Fewer rounds tell too little about the error to stop by it.
-const LEAST_ROUNDS: u32 = 2;
 
 fn blank_film(scene: &Scene, plan: &Plan) -> Film {
     let ImageSettings { width, height, .. } = scene.image;
@@ -193,6 +192,7 @@ impl Render {
             preview,
             effort: Effort::default(),
             even: backward,
+            shares: Vec::new(),
         }
     }
 
@@ -202,6 +202,21 @@ impl Render {
     #[must_use]
     pub fn evenly(self) -> Self {
         Self { even: true, ..self }
+    }
+
+    /// [`Render::evenly`], but pixels get samples in proportion to those that a pilot gave them, a render of the same scene with
+    /// another seed: as unbiased, since the choice hangs on none of its own samples, and far less noisy where single samples are
+    /// bright.
+    #[must_use]
+    pub fn sampled_as(self, pilot: &Self) -> Self {
+        /// Most of a pixel, over those of one that got the usual number.
+        const MOST: f32 = 32.0;
+        let mut counts: Vec<u32> = pilot.film.pixels().iter().map(|pixel| pixel.samples.max(1)).collect();
+        let share = |usual: u32, count: u32| (count as f32 / usual as f32).clamp(1.0, MOST).round() as u8;
+        let middle = counts.len() / 2;
+        let usual = *counts.clone().select_nth_unstable(middle).1;
+        let shares = counts.drain(..).map(|count| share(usual, count)).collect();
+        Self { shares, ..self.evenly() }
     }
 
     /// Renders the next round, in the rayon pool this is called in.
@@ -302,7 +317,6 @@ impl Render {
             return Some(StopReason::Rounds);
         }
         if let (Some(target), Some(error)) = (stop.error, self.error_estimate())
-            && self.rounds() >= LEAST_ROUNDS
             && is_milestone(self.rounds())
             && error <= target
         {

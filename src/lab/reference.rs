@@ -19,6 +19,12 @@ const LAMP_ROUNDS: u32 = 32;
 /// Each estimator is tried for this part of the budget; the better one goes on.
 const TRIAL: f64 = 0.125;
 
+/// A pilot has this part of the budget to find where samples are wanted.
+const PILOT: f64 = 0.06;
+
+/// Its seed.
+const PILOT_SEED: u64 = 0x5ee_d917;
+
 /// A picture to measure errors against.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
@@ -91,14 +97,15 @@ pub fn measure_reference(subject: &Subject<'_>, task: Task, budget: Budget) -> R
     let mask = if task == Task::Complete { without_lamps(subject)? } else { None };
     let mut trials = Vec::new();
     for (name, settings) in estimators(subject, task)? {
-        let mut timed = Timed::evenly(subject.scene(&settings, SEED)?);
-        run(&mut timed, TRIAL * budget.reference)?;
+        let scenes = (subject.scene(&settings, SEED)?, subject.scene(&settings, PILOT_SEED)?);
+        let mut timed = Timed::evenly(scenes.0, scenes.1, PILOT * budget.reference)?;
+        timed.run(TRIAL * budget.reference)?;
         trials.push((name, summary(&timed, mask.as_deref())?, timed));
     }
     trials.sort_by(|a, b| a.1.error.total_cmp(&b.1.error));
     let mut trials = trials.into_iter();
     let Some((name, _, mut timed)) = trials.next() else { return Err(LabError::NotAnObject) };
-    run(&mut timed, budget.reference)?;
+    timed.run(budget.reference)?;
     let mut reference = Reference { estimator: name, ..summary(&timed, mask.as_deref())? };
     if let Some((name, other, _)) = trials.next() {
         let against = compare(&other.image, &reference.image, mask.as_deref())?;
@@ -129,13 +136,6 @@ fn estimators(subject: &Subject<'_>, task: Task) -> Result<Vec<(String, Value)>,
         found.push(("backward paths".to_owned(), with(json!({ "caustics": "backward" }))));
     }
     Ok(found)
-}
-
-fn run(timed: &mut Timed, seconds: f64) -> Result<(), LabError> {
-    while timed.cpu < seconds || timed.render.rounds() < 2 {
-        timed.run_to_milestone()?;
-    }
-    Ok(())
 }
 
 fn summary(timed: &Timed, mask: Option<&[bool]>) -> Result<Reference, LabError> {

@@ -110,10 +110,20 @@ impl Timed {
         Self { render: Render::new(scene, plan), cpu, control: Control::new() }
     }
 
-    /// The same, without bias after any number of rounds.
-    pub(super) fn evenly(scene: Scene) -> Self {
+    /// The same, without bias after any number of rounds: where samples are wanted another render says, for so many seconds.
+    pub(super) fn evenly(scene: Scene, pilot: Scene, seconds: f64) -> Result<Self, RenderError> {
+        let mut pilot = Self::new(pilot);
+        pilot.run(seconds)?;
         let timed = Self::new(scene);
-        Self { render: timed.render.evenly(), ..timed }
+        Ok(Self { render: timed.render.sampled_as(&pilot.render), cpu: timed.cpu + pilot.cpu, ..timed })
+    }
+
+    /// Renders until so many seconds are used up, but at least two rounds.
+    pub(super) fn run(&mut self, seconds: f64) -> Result<(), RenderError> {
+        while self.cpu < seconds || self.render.rounds() < 2 {
+            self.run_to_milestone()?;
+        }
+        Ok(())
     }
 
     /// Renders up to the next round at which the product itself would look.

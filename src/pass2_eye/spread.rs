@@ -11,7 +11,7 @@ use crate::light_path::Kind;
 use crate::pass1_light::{LightImage, Spread};
 use crate::photon_map::Photon;
 use crate::sampling::hash;
-use crate::scene::Camera;
+use crate::scene::{Camera, Projection};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -73,10 +73,16 @@ impl Irradiance {
         }
         let mut patches = Vec::with_capacity(spread.images.len() + spread.points.len());
         let on_screen = Screen { camera, size: Vec2::new(width as f32, (count / width) as f32) };
-        let images = spread.images.iter().filter(|image| pick(image.kind));
-        images.for_each(|image| on_screen.place_image(image, &mut patches));
+        for image in spread.images.iter().filter(|image| pick(image.kind)) {
+            let middle = image.corners.iter().sum::<Vec3>() / 4.0;
+            if on_screen.sees(middle, image.direction, image.normal) {
+                on_screen.place_image(image, &mut patches);
+            }
+        }
         for photon in spread.points.iter().filter(|photon| pick(photon.kind)) {
-            on_screen.place(Light::from(photon), &mut patches);
+            if on_screen.sees(photon.position, photon.direction, photon.normal) {
+                on_screen.place(Light::from(photon), &mut patches);
+            }
         }
         let mut pixels = vec![Vec3::ZERO; count];
         pixels.par_chunks_mut(BAND * width).enumerate().for_each(|(band, pixels)| {
@@ -117,6 +123,17 @@ struct Screen<'a> {
 type Placed<'a> = (f32, f32, Patch<'a>);
 
 impl Screen<'_> {
+    /// Whether the eye looks at the side on which light comes to rest. What lies behind on the same sheet, on the far side of a
+    /// ball, has its place on the screen too.
+    fn sees(&self, position: Vec3, direction: Vec3, normal: Vec3) -> bool {
+        let to_eye = match self.camera.projection {
+            Projection::Perspective { .. } => self.camera.eye - position,
+            Projection::Orthographic { .. } => -self.camera.forward,
+        };
+        // On the same side of the surface as the light comes from.
+        normal.dot(direction) * normal.dot(to_eye) < 0.0
+    }
+
     fn place(&self, light: Light, patches: &mut Vec<Placed<'_>>) {
         let Some(at) = self.camera.raster(light.position) else { return };
         if at.cmpge(Vec2::ZERO).all() && at.cmplt(self.size).all() {

@@ -82,7 +82,7 @@ impl Render {
         // A round at most doubles what was done before: no single one overruns a limit of time by far.
         let most_shift = self.plan.most_photon_shift().min(self.blocks.max(1).ilog2() + 1);
         let effort = Effort::decide(&measured, most_shift, key);
-        self.effort = if self.even { effort.evened() } else { effort };
+        self.effort = if self.even { effort.evened(&self.shares) } else { effort };
         self.error = Some(PixelError::bound(&errors));
         self.preview = picture.image();
         self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));
