@@ -20,6 +20,7 @@ mod import;
 mod indirect;
 mod invariance;
 mod lab;
+mod large_lamps;
 mod light_images;
 mod light_sampling;
 mod lights;

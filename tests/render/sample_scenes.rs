@@ -5,8 +5,26 @@ use nephroid::plan::Plan;
 use nephroid::render::{Control, Render};
 use nephroid::scene::{Caustics, DirectoryAssets, Scene};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Where the sample scenes and what they are made of lie.
+pub(crate) fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")
+}
+
+/// Every sample scene by its name, without layers.
+pub(crate) fn sample_scenes() -> Vec<(String, Value)> {
+    let mut files: Vec<_> = std::fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "json"));
+    files.sort();
+    let read = |path: &PathBuf| {
+        let mut value: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+        value["render"].as_object_mut().map(|render| render.remove("layers"));
+        (path.file_stem().unwrap().display().to_string(), value)
+    };
+    files.iter().map(read).collect()
+}
 
 /// Two ways to the light of some paths.
 struct Pair {
@@ -38,7 +56,7 @@ fn pairs() -> Vec<Pair> {
 
 /// What the photons' kernel, a pixel wide, may lose or gain at the borders of what pixels show: 2.2 % of the caustics of `spot` in so
 /// few pixels, 0.4 % in twice as many across.
-const BORDERS: f64 = 0.03;
+pub(crate) const BORDERS: f64 = 0.03;
 
 /// Pictures by which a mean and its error are known.
 const SEEDS: u64 = 6;
@@ -63,16 +81,10 @@ fn light(value: &Value, assets: &DirectoryAssets) -> Estimate {
 /// Student's t of 5 degrees of freedom exceeds [`T_LIMIT`] in one of 1500 comparisons. At least three of four tell 10 %.
 #[test]
 fn direct_light_and_caustics_of_every_sample_scene_agree_between_two_estimators() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    let assets = DirectoryAssets::new(&folder);
-    let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.retain(|path| path.extension().is_some_and(|e| e == "json"));
-    files.sort();
+    let assets = DirectoryAssets::new(folder());
     let (mut compared, mut told) = (0, 0);
-    for file in &files {
-        let mut value: Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
+    for (file, mut value) in sample_scenes() {
         value["image"] = json!({ "width": 96, "height": 72 });
-        value["render"].as_object_mut().map(|render| render.remove("layers"));
         for pair in pairs() {
             value["render"]["paths"] = json!(pair.paths);
             let scene = Scene::from_json(&value.to_string(), &assets).unwrap_or_else(|e| panic!("{e}"));
@@ -86,7 +98,7 @@ fn direct_light_and_caustics_of_every_sample_scene_agree_between_two_estimators(
                 }
                 light(&value, &assets)
             });
-            let name = format!("{} {}", file.file_stem().unwrap().display(), pair.paths);
+            let name = format!("{file} {}", pair.paths);
             let error = a.standard_error.hypot(b.standard_error);
             if a.mean == 0.0 && b.mean == 0.0 {
                 continue;
