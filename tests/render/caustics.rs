@@ -411,6 +411,28 @@ fn f56_a_mirror_to_the_horizon_is_lit_from_all_directions() {
     estimate.assert_is(mean_over_square(0.0, 0.0, 0.8, image_source), 0.0);
 }
 
+/// A mirror lights a ball from the side, what the eye sees of it and what lies behind, the same sheet in the same place on the screen:
+/// the irradiance is what the lamp's image in the mirror gives. A lamp of no size brings points of light, another images.
+#[test]
+fn light_on_the_far_side_of_a_ball_is_not_seen() {
+    let slope = json!({ "type": "polygon", "material": "mirror", "vertices": [[2, 0, -1], [2, 0, 1], [4, 2, 1], [4, 2, -1]] });
+    let ball = json!({ "type": "sphere", "material": "floor", "center": [0, 1, 0], "radius": 0.5 });
+    let camera = json!({ "type": "orthographic", "eye": [0, 1, 3], "target": [0, 1, 0], "height": 0.6 });
+    let point = json!({ "type": "point", "position": [3, 21, 0], "intensity": [529, 529, 529] });
+    let quad = json!({ "type": "quad", "center": [3, 21, 0], "size": [1, 1], "towards": [3, 1, 0], "radiance": [529, 529, 529] });
+    let expected = mean_over_square(0.0, 0.0, 0.6, |x, y| {
+        let at = DVec3::new(x, y, (0.25 - x * x - y * y).sqrt());
+        let to = DVec3::new(23.0, 0.0, 0.0) - at;
+        0.9 * 529.0 * (to.normalize().dot(at) / 0.5).max(0.0) / to.length_squared()
+    });
+    for light in [point, quad] {
+        let value = scene(camera.clone(), json!([ball, slope]), json!([light]));
+        let estimate = over_seeds(|seed| mean_irradiance(&render(&value, seed, 1, 14), PathClass::Caustic));
+        // The look-up's kernel reaches over one of 16 pixels.
+        estimate.assert_is(expected, 0.01);
+    }
+}
+
 /// F59: counts go on beyond 2^32, and a sum of many small powers does not stall as it would in f32, at 0.25.
 #[test]
 fn f59_counts_and_sums_hold_any_number_of_photons() {
