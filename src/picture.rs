@@ -103,11 +103,12 @@ impl<'a> Picture<'a> {
         let image = self.image();
         let mean = image.pixels.iter().map(|p| mean_channel(Vec3::from_array(*p))).sum::<f32>();
         let floor = 0.1 * mean / image.pixels.len() as f32;
-        let around = around(&image);
-        let pixels = self.film.means().zip(image.pixels.par_iter().zip(around)).enumerate();
+        let (around, beside) = (around(&image), beside(&self.film.raw_layer(PathClass::Emitted)));
+        let pixels = self.film.means().zip(image.pixels.par_iter().zip(around.into_par_iter().zip(beside)));
         let mut errors: Vec<PixelError> = pixels
-            .map(|(i, (means, (value, around)))| {
-                self.error(i, &means, (Vec3::from_array(*value), around), floor)
+            .enumerate()
+            .map(|(i, (means, (value, (around, beside))))| {
+                self.error(i, &means, (Vec3::from_array(*value), around, beside), floor)
             })
             .collect();
         self.share_noise(&mut errors);
@@ -129,12 +130,13 @@ impl<'a> Picture<'a> {
     }
 
     /// The radiance that an error is relative to must not hold the error itself, or a single bright sample would never
-    /// count for more than its pixel: it is the darker half's, or what the pixels `around` agree on, up to the pixel's own.
+    /// count for more than its pixel: it is the darker half's, or what the pixels `around` agree on, up to the pixel's own. Of a lamp
+    /// that a pixel `beside` shows too it is no less than [`EDGE`] of what was found.
     fn error(
         &self,
         index: usize,
         means: &PixelMeans,
-        (value, around): (Vec3, Vec3),
+        (value, around, beside): (Vec3, Vec3, Vec3),
         floor: f32,
     ) -> PixelError {
         if floor <= 0.0 {
@@ -164,8 +166,11 @@ impl<'a> Picture<'a> {
         let photons = photons * photons + Vec3::splat(smoothed.unwrap_or(0.0));
         let paths = paths * paths + Vec3::splat(bounced.unwrap_or(0.0));
         let radiance = darker.max(value.min(around)).max(Vec3::ZERO);
-        let relative = |squares: Vec3| mean_channel(squares / (radiance * radiance + floor * floor));
-        let (sampled, paths, photons) = (relative(sampled * sampled), relative(paths), relative(photons));
+        let relative_to = |l: Vec3, squares: Vec3| mean_channel(squares / (l * l + floor * floor));
+        let relative = |squares: Vec3| relative_to(radiance, squares);
+        let lamp = EDGE * means.class(PathClass::Emitted).min(beside);
+        let sampled = relative_to(radiance.max(lamp), sampled * sampled);
+        let (paths, photons) = (relative(paths), relative(photons));
         let alone = |error: f32, smoothed: Option<f32>| if smoothed.is_some() { 0.0 } else { error * error };
         let variance = 2.0 / 3.0 * (sampled * sampled + alone(paths, bounced) + alone(photons, smoothed));
         PixelError { sampled, paths, photons, variance }
@@ -204,6 +209,24 @@ impl PixelError {
         let variance: f64 = errors.iter().map(|e| f64::from(e.variance)).sum();
         ((sum + ONE_SIDED_95 * (2.0 * variance).sqrt()) / errors.len().max(1) as f64).sqrt() as f32
     }
+}
+
+/// A pixel at a lamp's edge shows an unknown share p of it. Where of n samples one has met the lamp, in the mean over p, uniform as at
+/// an outline or with the density p^(-1/3) as at the rim of a blurred disc, the squared relative error of that and of the pixels in
+/// which none has is about that of a pixel of so much of what was found.
+const EDGE: f32 = 0.4;
+
+/// The most that any of a pixel's neighbours shows, by channel.
+fn beside(image: &LinearImage) -> Vec<Vec3> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let most = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
+        let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
+        let neighbours = rows.flat_map(|y| columns.clone().map(move |x| y * width + x)).filter(|&j| j != i);
+        neighbours.map(|j| Vec3::from_array(image.pixels[j])).fold(Vec3::ZERO, Vec3::max)
+    };
+    (0..image.pixels.len()).into_par_iter().map(most).collect()
 }
 
 /// What each pixel's neighbours agree on: the least mean of two that lie opposite to each other, by channel.
