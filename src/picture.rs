@@ -199,15 +199,15 @@ impl PixelError {
         self.sampled + self.paths + self.photons
     }
 
-    /// Root of the upper end of the mean's one-sided 95 % range: where few pixels hold most of the error, or many share theirs,
+    /// Root of the upper end of the mean's 95 % range: where few pixels hold most of the error, or many share theirs,
     /// the picture may be luckier or less lucky than its halves' difference says. Both vary, independently, by the same amount.
     #[must_use]
     pub fn bound(errors: &[Self]) -> f32 {
-        /// Standard deviations above the mean that 5 % of a normal distribution exceed.
-        const ONE_SIDED_95: f64 = 1.645;
+        /// Standard deviations between which 95 % of a normal distribution lie.
+        const RANGE_95: f64 = 1.96;
         let sum: f64 = errors.iter().map(|e| f64::from(e.total())).sum();
         let variance: f64 = errors.iter().map(|e| f64::from(e.variance)).sum();
-        ((sum + ONE_SIDED_95 * (2.0 * variance).sqrt()) / errors.len().max(1) as f64).sqrt() as f32
+        ((sum + RANGE_95 * (2.0 * variance).sqrt()) / errors.len().max(1) as f64).sqrt() as f32
     }
 }
 
