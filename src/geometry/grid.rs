@@ -138,14 +138,13 @@ impl Grid {
     pub(super) fn closest(
         &self,
         ray: &Ray,
-        mut nearest: Nearest,
+        nearest: &mut Nearest,
         mut test: impl FnMut(Place, &mut Nearest),
-    ) -> Nearest {
+    ) {
         self.walk(ray, |places, leave| {
-            places.iter().for_each(|place| test(*place, &mut nearest));
+            places.iter().for_each(|place| test(*place, nearest));
             f64::from(nearest.t) < leave
         });
-        nearest
     }
 
     /// True if `test` holds for any primitive on the ray before `t_max`.

@@ -4,8 +4,7 @@
 use super::bvh::Bvh;
 use super::leaves::{Leaves, Primitives, Source};
 use super::mesh::{Mesh, MeshData};
-use super::nearest::{Nearest, Place};
-use super::packet::ShearedRay;
+use super::nearest::{Areas, Nearest, Place};
 use super::{Bounds, HullPoint, Ray, SurfacePoint};
 use glam::{DAffine3, DMat3, Vec3};
 use std::sync::Arc;
@@ -66,14 +65,19 @@ impl Instance {
         }
     }
 
-    /// Distance in `(0, t_max)` and slot of the nearest triangle.
+    /// Distance in `(0, t_max)`, slot and areas of the nearest triangle.
     #[inline]
-    pub(super) fn intersect(&self, ray: &Ray, t_max: f32, meshes: &[Arc<SharedMesh>]) -> Option<(f32, u32)> {
+    pub(super) fn intersect(
+        &self,
+        ray: &Ray,
+        t_max: f32,
+        meshes: &[Arc<SharedMesh>],
+    ) -> Option<(f32, u32, Areas)> {
         let shared = &meshes[self.shared as usize];
-        let start = Nearest { t: t_max.min(f32::MAX), ..Nearest::NONE };
-        let nearest = shared.bvh.closest(&shared.leaves, &self.local(ray), start, |_, _| {});
+        let mut nearest = Nearest::before(t_max);
+        shared.bvh.closest(&shared.leaves, &self.local(ray), &mut nearest, |_, _| {});
         match nearest.place {
-            Some(Place::Triangle(slot)) if nearest.t < t_max => Some((nearest.t, slot)),
+            Some(Place::Triangle(slot)) if nearest.t < t_max => Some((nearest.t, slot, nearest.areas)),
             _ => None,
         }
     }
@@ -85,13 +89,12 @@ impl Instance {
         shared.bvh.any(&shared.leaves, &self.local(ray), t_max, |_| false)
     }
 
-    /// The surface where the ray meets the triangle in a slot.
-    pub(super) fn surface(&self, ray: &Ray, slot: u32, meshes: &[Arc<SharedMesh>]) -> Option<SurfacePoint> {
+    /// The surface where a ray that cuts the triangle in a slot into these areas meets it.
+    pub(super) fn surface(&self, slot: u32, areas: Areas, meshes: &[Arc<SharedMesh>]) -> SurfacePoint {
         let shared = &meshes[self.shared as usize];
         let triangle = shared.leaves.triangle(slot);
-        let (_, weights) = triangle.intersect(&ShearedRay::new(&self.local(ray)), f32::INFINITY)?;
-        let local = triangle.surface(weights, &shared.mesh.shading(shared.leaves.number(slot)));
-        Some(placed(local, &self.to_world, &self.normals))
+        let local = triangle.surface(areas.weights(), &shared.mesh.shading(shared.leaves.number(slot)));
+        placed(local, &self.to_world, &self.normals)
     }
 
     pub(super) fn bounds(&self, meshes: &[Arc<SharedMesh>]) -> Bounds {

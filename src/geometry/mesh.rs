@@ -30,6 +30,7 @@ impl Mesh {
     }
 
     /// What is interpolated over a triangle.
+    #[inline]
     pub(super) fn shading(&self, index: u32) -> TriangleShading {
         let Some(corners) = self.0.triangles.get(index as usize) else { return TriangleShading::FLAT };
         let corners = corners.map(|v| v as usize);

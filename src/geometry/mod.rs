@@ -37,7 +37,7 @@ use instance::{Instance, SharedMesh};
 use leaves::{Child, Entry, Leaves, Run, Shape, Word};
 use mesh::Mesh;
 use moving::Moving;
-use nearest::{Nearest, Place};
+use nearest::{Areas, Nearest, Place};
 use packet::ShearedRay;
 use polygon::{Edge, Polygon};
 use sphere::Sphere;
@@ -131,25 +131,27 @@ impl Geometry {
     /// The first surface along the ray.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.hit(ray, &self.nearest(ray, Nearest::NONE))
+        let mut nearest = Nearest::NONE;
+        self.find_nearest(ray, &mut nearest);
+        self.hit(ray, &nearest)
     }
 
-    /// Finds a hit nearer than `start`.
+    /// Finds a hit nearer than `nearest`.
     #[inline]
-    fn nearest(&self, ray: &Ray, start: Nearest) -> Nearest {
+    fn find_nearest(&self, ray: &Ray, nearest: &mut Nearest) {
         let others = |run: Run, nearest: &mut Nearest| self.closest_of_run(run, ray, nearest);
         match &self.accel {
-            Accel::List(words) => self.closest_of_list(words, ray, start),
-            Accel::Bvh(bvh) => bvh.closest(&self.leaves, ray, start, others),
+            Accel::List(words) => self.closest_of_list(words, ray, nearest),
+            Accel::Bvh(bvh) => bvh.closest(&self.leaves, ray, nearest, others),
             Accel::Grid(grid) => {
                 let sheared = ShearedRay::new(ray);
-                grid.closest(ray, start, |place, nearest| {
+                grid.closest(ray, nearest, |place, nearest| {
                     self.closest_of_place(place, ray, &sheared, nearest);
                 })
             }
             Accel::Spheres(tree) => {
                 let sheared = ShearedRay::new(ray);
-                tree.closest(ray, start, |place, nearest| {
+                tree.closest(ray, nearest, |place, nearest| {
                     self.closest_of_place(place, ray, &sheared, nearest);
                 })
             }
@@ -157,38 +159,45 @@ impl Geometry {
     }
 
     /// What is hit there.
+    #[inline]
     fn hit(&self, ray: &Ray, nearest: &Nearest) -> Option<Hit> {
-        let place = nearest.place?;
-        let owner = self.owner(nearest.primitive);
-        let surface = match place {
-            Place::Entry(entry) => match self.leaves.entries[entry as usize].shape {
-                Shape::Sphere(i) => self.spheres[i as usize].surface(ray, nearest.t),
-                Shape::Polygon(i) => self.polygons[i as usize].surface(ray, nearest.t),
-                Shape::Disk(i) => self.disks[i as usize].surface(ray),
-                Shape::Cylinder(i) => self.cylinders[i as usize].surface(ray),
-                Shape::Moving(i) => {
-                    let hit = self.moving[i as usize].hit(ray, nearest.t)?;
-                    return Some(Hit { object: owner.object, ..hit });
-                }
-                Shape::Instance(_) => return None,
-            },
-            Place::Instance(entry, slot) => match self.leaves.entries[entry as usize].shape {
-                Shape::Instance(i) => self.instances[i as usize].surface(ray, slot, &self.shared)?,
-                Shape::Sphere(_)
-                | Shape::Polygon(_)
-                | Shape::Disk(_)
-                | Shape::Cylinder(_)
-                | Shape::Moving(_) => return None,
-            },
-            Place::Triangle(slot) => {
-                let triangle = self.leaves.triangle(slot);
-                let (_, weights) = triangle.intersect(&ShearedRay::new(ray), f32::INFINITY)?;
-                let mesh = &self.meshes[owner.mesh? as usize];
-                let shading = mesh.shading(nearest.primitive - owner.first);
-                triangle.surface(weights, &shading)
-            }
+        // The place is not copied: a copy of the whole would wait for its parts.
+        let slot = match nearest.place {
+            None => return None,
+            Some(Place::Triangle(slot)) => slot,
+            Some(place) => return self.other_hit(ray, nearest, place),
         };
-        Some(Hit { t: nearest.t, surface, object: owner.object, sheet: self.sheet(place, owner.object) })
+        let owner = self.owner(nearest.primitive);
+        let shading = self.meshes[owner.mesh? as usize].shading(nearest.primitive - owner.first);
+        let surface = self.leaves.triangle(slot).surface(nearest.areas.weights(), &shading);
+        Some(Hit {
+            t: nearest.t,
+            surface,
+            object: owner.object,
+            sheet: self.sheet(Place::Triangle(slot), owner.object),
+        })
+    }
+
+    /// What is hit of a primitive that is not a triangle of the scene itself.
+    #[inline(never)]
+    fn other_hit(&self, ray: &Ray, nearest: &Nearest, place: Place) -> Option<Hit> {
+        let object = self.owner(nearest.primitive).object;
+        let (Place::Entry(entry) | Place::Instance(entry, _)) = place else { return None };
+        let surface = match (self.leaves.entries[entry as usize].shape, place) {
+            (Shape::Sphere(i), _) => self.spheres[i as usize].surface(ray, nearest.t),
+            (Shape::Polygon(i), _) => self.polygons[i as usize].surface(ray, nearest.t),
+            (Shape::Disk(i), _) => self.disks[i as usize].surface(ray),
+            (Shape::Cylinder(i), _) => self.cylinders[i as usize].surface(ray),
+            (Shape::Moving(i), _) => {
+                let hit = self.moving[i as usize].hit(ray, nearest.t)?;
+                return Some(Hit { object, ..hit });
+            }
+            (Shape::Instance(i), Place::Instance(_, slot)) => {
+                self.instances[i as usize].surface(slot, nearest.areas, &self.shared)
+            }
+            (Shape::Instance(_), Place::Entry(_) | Place::Triangle(_)) => return None,
+        };
+        Some(Hit { t: nearest.t, surface, object, sheet: self.sheet(place, object) })
     }
 
     /// True if any surface lies strictly between the ray's origin and the distance `t_max`.
@@ -213,7 +222,8 @@ impl Geometry {
         match place {
             Place::Triangle(slot) => {
                 let hit = self.leaves.triangle(slot).intersect(sheared, nearest.limit());
-                hit.into_iter().for_each(|(t, _)| nearest.offer(t, self.leaves.number(slot), place));
+                hit.into_iter()
+                    .for_each(|(t, areas)| nearest.offer(t, self.leaves.number(slot), place, areas));
             }
             Place::Entry(entry) | Place::Instance(entry, _) => {
                 self.closest_of_run(Run { first: entry as usize, count: 1 }, ray, nearest);
@@ -230,18 +240,17 @@ impl Geometry {
         }
     }
 
-    fn closest_of_list(&self, words: &[Word], ray: &Ray, mut nearest: Nearest) -> Nearest {
+    fn closest_of_list(&self, words: &[Word], ray: &Ray, nearest: &mut Nearest) {
         let sheared = ShearedRay::new(ray);
         for word in words {
             match word.child() {
                 Child::Packet(index) => {
-                    self.leaves.packets[index].closest_one_by_one(&sheared, index, &mut nearest)
+                    self.leaves.packets[index].closest_one_by_one(&sheared, index, nearest)
                 }
-                Child::Run(run) => self.closest_of_run(run, ray, &mut nearest),
+                Child::Run(run) => self.closest_of_run(run, ray, nearest),
                 Child::Node(_) => {}
             }
         }
-        nearest
     }
 
     fn any_of_list(&self, words: &[Word], ray: &Ray, t_max: f32) -> bool {
@@ -256,7 +265,7 @@ impl Geometry {
     #[inline]
     fn closest_of_run(&self, run: Run, ray: &Ray, nearest: &mut Nearest) {
         for (index, entry) in self.entries(run) {
-            let (t_max, index) = (nearest.limit(), index as u32);
+            let (t_max, index, mut areas) = (nearest.limit(), index as u32, Areas::NONE);
             let (hit, place) = match entry.shape {
                 Shape::Sphere(i) => (self.spheres[i as usize].intersect(ray, t_max), Place::Entry(index)),
                 Shape::Polygon(i) => {
@@ -267,11 +276,12 @@ impl Geometry {
                 Shape::Moving(i) => (self.moving[i as usize].intersect(ray, t_max), Place::Entry(index)),
                 Shape::Instance(i) => {
                     let hit = self.instances[i as usize].intersect(ray, t_max, &self.shared);
-                    (hit.map(|(t, _)| t), Place::Instance(index, hit.map_or(0, |(_, slot)| slot)))
+                    areas = hit.map_or(areas, |(_, _, areas)| areas);
+                    (hit.map(|(t, ..)| t), Place::Instance(index, hit.map_or(0, |(_, slot, _)| slot)))
                 }
             };
             if let Some(t) = hit {
-                nearest.offer(t, entry.primitive, place);
+                nearest.offer(t, entry.primitive, place, areas);
             }
         }
     }

@@ -44,8 +44,8 @@ impl Moving {
     /// Distance of the nearest hit in `(0, t_max)`.
     #[inline]
     pub(super) fn intersect(&self, ray: &Ray, t_max: f32) -> Option<f32> {
-        let start = Nearest { t: t_max.min(f32::MAX), ..Nearest::NONE };
-        let nearest = self.part.nearest(&self.local(ray), start);
+        let mut nearest = Nearest::before(t_max);
+        self.part.find_nearest(&self.local(ray), &mut nearest);
         (nearest.place.is_some() && nearest.t < t_max).then_some(nearest.t)
     }
 
@@ -58,7 +58,8 @@ impl Moving {
     pub(super) fn hit(&self, ray: &Ray, t: f32) -> Option<Hit> {
         let local = self.local(ray);
         // Nothing is nearer: the walk is short.
-        let nearest = self.part.nearest(&local, Nearest { t, ..Nearest::NONE });
+        let mut nearest = Nearest::before(t);
+        self.part.find_nearest(&local, &mut nearest);
         let hit = self.part.hit(&local, &nearest)?;
         let surface = if self.motion.turn.is_none() {
             let shift = self.motion.shift(ray.time);

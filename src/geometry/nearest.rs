@@ -1,5 +1,7 @@
 //! The nearest hit so far.
 
+use glam::Vec3;
+
 /// Where a primitive lies in the structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
@@ -9,6 +11,22 @@ pub(super) enum Place {
     Entry(u32),
     /// Index of an instance among the other primitives, and the slot of a triangle in its mesh.
     Instance(u32, u32),
+}
+
+/// Areas of the three parts into which a hit cuts its triangle, up to a factor that they share. The test for the hit
+/// has them, and the surface there follows from them, so that no triangle is tested twice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Areas(pub(super) Vec3);
+
+impl Areas {
+    pub(super) const NONE: Self = Self(Vec3::ZERO);
+
+    /// The barycentric weights of the three corners.
+    #[inline]
+    pub(super) fn weights(self) -> Vec3 {
+        let Vec3 { x, y, z } = self.0;
+        self.0 / (x + y + z)
+    }
 }
 
 /// The nearest hit so far. Of two at the same distance the primitive that came first in the scene counts, so
@@ -21,16 +39,23 @@ pub(super) struct Nearest {
     pub(super) primitive: u32,
     /// Where it lies; `None` if there is no hit yet.
     pub(super) place: Option<Place>,
+    /// [`Areas`] of a triangle; 0 for other primitives.
+    pub(super) areas: Areas,
 }
 
 impl Nearest {
-    pub(super) const NONE: Self = Self { t: f32::MAX, primitive: u32::MAX, place: None };
+    pub(super) const NONE: Self = Self { t: f32::MAX, primitive: u32::MAX, place: None, areas: Areas::NONE };
+
+    /// No hit yet, and none counts that is farther.
+    pub(super) fn before(t_max: f32) -> Self {
+        Self { t: t_max.min(f32::MAX), ..Self::NONE }
+    }
 
     /// Takes a hit if it is nearer.
     #[inline]
-    pub(super) fn offer(&mut self, t: f32, primitive: u32, place: Place) {
+    pub(super) fn offer(&mut self, t: f32, primitive: u32, place: Place, areas: Areas) {
         if t < self.t || (t == self.t && primitive < self.primitive) {
-            *self = Self { t, primitive, place: Some(place) };
+            *self = Self { t, primitive, place: Some(place), areas };
         }
     }
 

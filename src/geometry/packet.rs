@@ -5,7 +5,7 @@
 //! and the signs of the three edge functions there are exact.
 
 use super::bounds::Bounds;
-use super::nearest::{Nearest, Place};
+use super::nearest::{Areas, Nearest, Place};
 use super::simd::{Column, Lanes};
 use super::{Ray, SurfacePoint};
 use glam::{Vec2, Vec3, Vec3A};
@@ -46,8 +46,7 @@ impl ShearedRay {
         let not_x = usize::from(a.x < a.y) | usize::from(a.x < a.z);
         let axes = AXES[not_x << usize::from(a.y < a.z)];
         let d = d.to_array();
-        let [x, y, z] = axes.map(|axis| d[axis]);
-        let shear = Vec3A::new(x, y, 1.0) / z;
+        let shear = Vec3A::new(d[axes[0]], d[axes[1]], 1.0) / d[axes[2]];
         Self { origin: ray.origin, axes, shear: shear.into() }
     }
 
@@ -55,15 +54,15 @@ impl ShearedRay {
     #[inline]
     fn transform(&self, corner: Vec3) -> Vec3 {
         let p = (corner - self.origin).to_array();
-        let [x, y, z] = self.axes.map(|axis| p[axis]);
+        let [x, y, z] = [p[self.axes[0]], p[self.axes[1]], p[self.axes[2]]];
         Vec3::new(x - self.shear.x * z, y - self.shear.y * z, self.shear.z * z)
     }
 }
 
 impl Triangle {
-    /// Distance along the ray in `(0, t_max)` and the barycentric weights of the three corners.
+    /// Distance along the ray in `(0, t_max)` and what the barycentric weights of the three corners follow from.
     #[inline(always)]
-    pub(super) fn intersect(&self, ray: &ShearedRay, t_max: f32) -> Option<(f32, Vec3)> {
+    pub(super) fn intersect(&self, ray: &ShearedRay, t_max: f32) -> Option<(f32, Areas)> {
         let [a, b, c] = self.0.map(|corner| ray.transform(corner));
         let mut u = c.x * b.y - c.y * b.x;
         let mut v = a.x * c.y - a.y * c.x;
@@ -80,7 +79,7 @@ impl Triangle {
         let determinant = u + v + w;
         // A triangle seen from its edge has determinant 0 and a distance that is not a number.
         let t = (u * a.z + v * b.z + w * c.z) / determinant;
-        (t > 0.0 && t < t_max).then(|| (t, Vec3::new(u, v, w) / determinant))
+        (t > 0.0 && t < t_max).then(|| (t, Areas(Vec3::new(u, v, w))))
     }
 
     /// The surface at the point with these barycentric weights.
@@ -134,12 +133,11 @@ pub(super) struct LaneRay<L: Lanes> {
 impl<L: Lanes> LaneRay<L> {
     #[inline(always)]
     pub(super) fn new(lanes: L, ray: &ShearedRay) -> Self {
+        // As an array: a vector picks a component by branches.
+        let origin = ray.origin.to_array();
+        let [x, y, z] = ray.axes;
         Self {
-            origin: [
-                lanes.splat(ray.origin[ray.axes[0]]),
-                lanes.splat(ray.origin[ray.axes[1]]),
-                lanes.splat(ray.origin[ray.axes[2]]),
-            ],
+            origin: [lanes.splat(origin[x]), lanes.splat(origin[y]), lanes.splat(origin[z])],
             axes: ray.axes,
             shear: [lanes.splat(ray.shear.x), lanes.splat(ray.shear.y), lanes.splat(ray.shear.z)],
         }
@@ -168,6 +166,8 @@ struct Tested<F> {
     edge: u32,
     /// Distances.
     t: F,
+    /// [`Areas`] of the lanes.
+    areas: (F, F, F),
 }
 
 impl Packet {
@@ -206,23 +206,35 @@ impl Packet {
         index: usize,
         nearest: &mut Nearest,
     ) {
-        let Tested { hit, mut edge, t } = self.test(lanes, ray);
+        let Tested { hit, edge, t, areas } = self.test(lanes, ray);
         let mut hit = hit & lanes.at_most(t, lanes.splat(nearest.t));
         if hit | edge == 0 {
             return;
         }
         let place = |lane: usize| Place::Triangle((index * 8 + lane) as u32);
         let t = lanes.store(t);
+        let (u, v, w) = (lanes.store(areas.0), lanes.store(areas.1), lanes.store(areas.2));
         while hit != 0 {
             let lane = hit.trailing_zeros() as usize % 8;
             hit &= hit - 1;
-            nearest.offer(t[lane], self.primitives[lane], place(lane));
+            let areas = Areas(Vec3::new(u[lane], v[lane], w[lane]));
+            nearest.offer(t[lane], self.primitives[lane], place(lane), areas);
         }
-        while edge != 0 {
-            let lane = edge.trailing_zeros() as usize % 8;
-            edge &= edge - 1;
-            if let Some((t, _)) = self.triangle(lane).intersect(sheared, nearest.limit()) {
-                nearest.offer(t, self.primitives[lane], place(lane));
+        if edge != 0 {
+            self.closest_of(edge, sheared, index, nearest);
+        }
+    }
+
+    /// Finds the nearest hit among some of its triangles one by one. Rays through edges are rare: this stays out of
+    /// the walk, whose registers it would take.
+    #[cold]
+    #[inline(never)]
+    fn closest_of(&self, mut lanes: u32, sheared: &ShearedRay, index: usize, nearest: &mut Nearest) {
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % 8;
+            lanes &= lanes - 1;
+            if let Some((t, areas)) = self.triangle(lane).intersect(sheared, nearest.limit()) {
+                nearest.offer(t, self.primitives[lane], Place::Triangle((index * 8 + lane) as u32), areas);
             }
         }
     }
@@ -235,25 +247,25 @@ impl Packet {
         (ray, sheared): (&LaneRay<L>, &ShearedRay),
         t_max: f32,
     ) -> bool {
-        let Tested { hit, mut edge, t } = self.test(lanes, ray);
+        let Tested { hit, edge, t, .. } = self.test(lanes, ray);
         if hit & lanes.less(t, lanes.splat(t_max)) != 0 {
             return true;
         }
-        while edge != 0 {
-            let lane = edge.trailing_zeros() as usize % 8;
-            edge &= edge - 1;
-            if self.triangle(lane).intersect(sheared, t_max).is_some() {
-                return true;
-            }
-        }
-        false
+        edge != 0 && self.any_of(edge, sheared, t_max)
+    }
+
+    /// True if any of some of its triangles is hit before `t_max`, as in [`Packet::closest_of`].
+    #[cold]
+    #[inline(never)]
+    fn any_of(&self, lanes: u32, sheared: &ShearedRay, t_max: f32) -> bool {
+        (0..8).any(|lane| lanes >> lane & 1 != 0 && self.triangle(lane).intersect(sheared, t_max).is_some())
     }
 
     /// [`Packet::closest`] without the instructions for eight at a time.
     pub(super) fn closest_one_by_one(&self, ray: &ShearedRay, index: usize, nearest: &mut Nearest) {
         for (lane, &primitive) in self.primitives.iter().enumerate() {
-            if let Some((t, _)) = self.triangle(lane).intersect(ray, nearest.limit()) {
-                nearest.offer(t, primitive, Place::Triangle((index * 8 + lane) as u32));
+            if let Some((t, areas)) = self.triangle(lane).intersect(ray, nearest.limit()) {
+                nearest.offer(t, primitive, Place::Triangle((index * 8 + lane) as u32), areas);
             }
         }
     }
@@ -278,13 +290,13 @@ impl Packet {
         let most = lanes.max(lanes.max(u, v), w);
         let inside = !(lanes.less(least, zero) & lanes.less(zero, most)) & 0xff;
         if inside == 0 {
-            return Tested { hit: 0, edge: 0, t: zero };
+            return Tested { hit: 0, edge: 0, t: zero, areas: (zero, zero, zero) };
         }
         let edge = inside & (lanes.equal(least, zero) | lanes.equal(most, zero));
         let determinant = lanes.add(lanes.add(u, v), w);
         let weighted = lanes.add(lanes.add(lanes.mul(u, a[2]), lanes.mul(v, b[2])), lanes.mul(w, c[2]));
         let t = lanes.div(weighted, determinant);
-        Tested { hit: inside & !edge & lanes.less(zero, t), edge, t }
+        Tested { hit: inside & !edge & lanes.less(zero, t), edge, t, areas: (u, v, w) }
     }
 }
 

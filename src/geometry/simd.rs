@@ -38,12 +38,18 @@ pub(super) trait Kernel {
 }
 
 /// Runs a kernel on the fastest lanes of this machine.
-#[inline]
+#[inline(always)]
 pub(super) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     if let Some(avx) = avx::Avx::detect() {
         return avx.run(kernel);
     }
+    plainly(kernel)
+}
+
+/// Runs a kernel on plain arrays, apart from [`dispatch`], whose callers need not make room for it.
+#[inline(never)]
+fn plainly<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Portable)
 }
 

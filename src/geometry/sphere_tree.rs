@@ -73,14 +73,13 @@ impl SphereTree {
     pub(super) fn closest(
         &self,
         ray: &Ray,
-        mut nearest: Nearest,
+        nearest: &mut Nearest,
         mut test: impl FnMut(Place, &mut Nearest),
-    ) -> Nearest {
+    ) {
         self.walk(ray, |leaf| {
-            leaf.iter().for_each(|place| test(*place, &mut nearest));
+            leaf.iter().for_each(|place| test(*place, nearest));
             Some(nearest.t)
         });
-        nearest
     }
 
     /// True if `test` holds for any primitive on the ray before `t_max`.

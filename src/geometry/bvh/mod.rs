@@ -45,10 +45,10 @@ impl Bvh {
         &self,
         leaves: &Leaves,
         ray: &Ray,
-        nearest: Nearest,
+        nearest: &mut Nearest,
         others: impl FnMut(Run, &mut Nearest),
-    ) -> Nearest {
-        dispatch(Closest { bvh: self, leaves, ray, nearest, others })
+    ) {
+        dispatch(Closest { bvh: self, leaves, ray, nearest, others });
     }
 
     /// True if anything is hit before `t_max`.
@@ -84,8 +84,13 @@ impl<L: Lanes> Slabs<L> {
         let reach = (min - origin).abs().max((max - origin).abs()).max_element();
         // Rounding the sum, by half an ulp, must not undo it.
         let slack = Vec3A::splat(reach * HIT_ROUNDING) + origin.abs() * f32::EPSILON;
-        let (above, below) = ((origin + slack).to_array(), (origin - slack).to_array());
-        let inverses = (Vec3A::ONE / direction).to_array();
+        let (above, below) = (origin + slack, origin - slack);
+        let inverse = Vec3A::ONE / direction;
+        // Without branches, as which way a ray runs is hard to predict.
+        let backwards = inverse.cmplt(Vec3A::ZERO);
+        let enter = Vec3A::select(backwards, below, above).to_array();
+        let leave = Vec3A::select(backwards, above, below).to_array();
+        let (inverse, backwards) = (inverse.to_array(), backwards.bitmask());
         let mut slabs = Self {
             enter: [lanes.splat(0.0); 3],
             leave: [lanes.splat(0.0); 3],
@@ -94,12 +99,10 @@ impl<L: Lanes> Slabs<L> {
             zero: lanes.splat(0.0),
         };
         for axis in 0..3 {
-            let inverse = inverses[axis];
-            let backwards = inverse < 0.0;
-            slabs.enter[axis] = lanes.splat(if backwards { below[axis] } else { above[axis] });
-            slabs.leave[axis] = lanes.splat(if backwards { above[axis] } else { below[axis] });
-            slabs.inverse[axis] = lanes.splat(inverse);
-            slabs.enter_plane[axis] = usize::from(backwards);
+            slabs.enter[axis] = lanes.splat(enter[axis]);
+            slabs.leave[axis] = lanes.splat(leave[axis]);
+            slabs.inverse[axis] = lanes.splat(inverse[axis]);
+            slabs.enter_plane[axis] = (backwards >> axis & 1) as usize;
         }
         slabs
     }
@@ -163,32 +166,39 @@ impl Waiting {
 
 type Stack = ArrayVec<Waiting, STACK>;
 
+/// At the start of a cache line, and with it the frame around it: the registers that are kept there then never lie
+/// across two lines, wherever the caller's frame ends.
+#[repr(align(64))]
+struct Aligned<T>(T);
+
 struct Closest<'a, F> {
     bvh: &'a Bvh,
     leaves: &'a Leaves,
     ray: &'a Ray,
-    nearest: Nearest,
+    /// Written in place: a copy of the whole would wait for its parts.
+    nearest: &'a mut Nearest,
     others: F,
 }
 
 impl<F: FnMut(Run, &mut Nearest)> Kernel for Closest<'_, F> {
-    type Output = Nearest;
+    type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(mut self, lanes: L) -> Nearest {
-        let mut nearest = self.nearest;
-        let Some(mut word) = self.bvh.root else { return nearest };
+    fn run<L: Lanes>(mut self, lanes: L) {
+        let nearest = self.nearest;
+        let Some(mut word) = self.bvh.root else { return };
         let slabs = Slabs::new(lanes, self.ray, &self.bvh.bounds);
         let sheared = ShearedRay::new(self.ray);
         let lane_ray = LaneRay::new(lanes, &sheared);
-        let mut stack = Stack::new();
+        let mut stack = Aligned(Stack::new());
+        let stack = &mut stack.0;
         loop {
             match word.child() {
                 Child::Node(index) => {
                     let node = &self.bvh.nodes[index];
                     let (mask, enter) = slabs.meets(lanes, node, lanes.splat(nearest.t));
                     if mask & mask.wrapping_sub(1) != 0 {
-                        word = nearest_of(&mut stack, node, mask, &lanes.store(enter)).word();
+                        word = nearest_of(stack, node, mask, &lanes.store(enter)).word();
                         continue;
                     }
                     if mask != 0 {
@@ -197,13 +207,13 @@ impl<F: FnMut(Run, &mut Nearest)> Kernel for Closest<'_, F> {
                     }
                 }
                 Child::Packet(index) => {
-                    self.leaves.packets[index].closest(lanes, (&lane_ray, &sheared), index, &mut nearest);
+                    self.leaves.packets[index].closest(lanes, (&lane_ray, &sheared), index, nearest);
                 }
-                Child::Run(run) => (self.others)(run, &mut nearest),
+                Child::Run(run) => (self.others)(run, nearest),
             }
             word = loop {
                 match stack.pop() {
-                    None => return nearest,
+                    None => return,
                     Some(waiting) if waiting.enter() <= nearest.t => break waiting.word(),
                     Some(_) => {}
                 }
@@ -335,14 +345,11 @@ mod tests {
                 _ => Vec3::AXES[i as usize / 3 % 3],
             };
             let ray = &Ray::new(origin, direction);
-            let closest = || Closest {
-                bvh: &bvh,
-                leaves: &leaves,
-                ray,
-                nearest: Nearest::NONE,
-                others: |_, _: &mut Nearest| {},
-            };
-            let (wide, plain) = (dispatch(closest()), closest().run(Portable));
+            let (mut wide, mut plain) = (Nearest::NONE, Nearest::NONE);
+            let others = |_, _: &mut Nearest| {};
+            dispatch(Closest { bvh: &bvh, leaves: &leaves, ray, nearest: &mut wide, others });
+            Closest { bvh: &bvh, leaves: &leaves, ray, nearest: &mut plain, others }.run(Portable);
+            assert_eq!(wide.areas, plain.areas, "{i}");
             assert_eq!((wide.t.to_bits(), wide.primitive), (plain.t.to_bits(), plain.primitive), "{i}");
             let any = || Any { bvh: &bvh, leaves: &leaves, ray, t_max: 0.3, others: |_| false };
             assert_eq!(dispatch(any()), any().run(Portable), "{i}");
