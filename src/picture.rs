@@ -216,10 +216,13 @@ impl PixelError {
 /// which none has is about that of a pixel of so much of what was found.
 const EDGE: f32 = 0.4;
 
-/// The most that any of a pixel's neighbours shows, by channel.
+/// The most that any neighbour of a pixel that shows anything shows, by channel.
 fn beside(image: &LinearImage) -> Vec<Vec3> {
     let (width, height) = (image.width as usize, image.height as usize);
     let most = |i: usize| {
+        if image.pixels[i] == [0.0; 3] {
+            return Vec3::ZERO;
+        }
         let (x, y) = (i % width, i / width);
         let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
         let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
