@@ -160,6 +160,9 @@ pub struct Render {
 /// With no limit given at all, this many rounds end a render that never reaches its error.
 const MOST_ROUNDS: u32 = 1 << 20;
 
+/// Fewer rounds tell too little about the error to stop by it.
+pub(crate) const LEAST_ROUNDS: u32 = 2;
+
 fn blank_film(scene: &Scene, plan: &Plan) -> Film {
     let ImageSettings { width, height, .. } = scene.image;
     Film::new(width, height, scene.render.caustics, plan.layer_names.len())
@@ -211,11 +214,11 @@ impl Render {
     pub fn sampled_as(self, pilot: &Self) -> Self {
         /// Most of a pixel, over those of one that got the usual number.
         const MOST: f32 = 32.0;
-        let mut counts: Vec<u32> = pilot.film.pixels().iter().map(|pixel| pixel.samples.max(1)).collect();
-        let share = |usual: u32, count: u32| (count as f32 / usual as f32).clamp(1.0, MOST).round() as u8;
-        let middle = counts.len() / 2;
-        let usual = *counts.clone().select_nth_unstable(middle).1;
-        let shares = counts.drain(..).map(|count| share(usual, count)).collect();
+        let counts = || pilot.film.pixels().iter().map(|pixel| pixel.samples.max(1) as f32);
+        let mut sorted: Vec<f32> = counts().collect();
+        let middle = sorted.len() / 2;
+        let usual = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let shares = counts().map(|count| (count / usual).clamp(1.0, MOST).round() as u8).collect();
         Self { shares, ..self.evenly() }
     }
 
@@ -317,6 +320,7 @@ impl Render {
             return Some(StopReason::Rounds);
         }
         if let (Some(target), Some(error)) = (stop.error, self.error_estimate())
+            && self.rounds() >= LEAST_ROUNDS
             && is_milestone(self.rounds())
             && error <= target
         {

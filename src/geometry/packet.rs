@@ -229,13 +229,15 @@ impl Packet {
     /// the walk, whose registers it would take.
     #[cold]
     #[inline(never)]
-    fn closest_of(&self, mut lanes: u32, sheared: &ShearedRay, index: usize, nearest: &mut Nearest) {
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % 8;
-            lanes &= lanes - 1;
-            if let Some((t, areas)) = self.triangle(lane).intersect(sheared, nearest.limit()) {
-                nearest.offer(t, self.primitives[lane], Place::Triangle((index * 8 + lane) as u32), areas);
-            }
+    fn closest_of(&self, lanes: u32, sheared: &ShearedRay, index: usize, nearest: &mut Nearest) {
+        let among = (0..8).filter(|lane| lanes >> lane & 1 != 0);
+        among.for_each(|lane| self.closest_in(lane, sheared, index, nearest));
+    }
+
+    #[inline]
+    fn closest_in(&self, lane: usize, ray: &ShearedRay, index: usize, nearest: &mut Nearest) {
+        if let Some((t, areas)) = self.triangle(lane).intersect(ray, nearest.limit()) {
+            nearest.offer(t, self.primitives[lane], Place::Triangle((index * 8 + lane) as u32), areas);
         }
     }
 
@@ -263,11 +265,7 @@ impl Packet {
 
     /// [`Packet::closest`] without the instructions for eight at a time.
     pub(super) fn closest_one_by_one(&self, ray: &ShearedRay, index: usize, nearest: &mut Nearest) {
-        for (lane, &primitive) in self.primitives.iter().enumerate() {
-            if let Some((t, areas)) = self.triangle(lane).intersect(ray, nearest.limit()) {
-                nearest.offer(t, primitive, Place::Triangle((index * 8 + lane) as u32), areas);
-            }
-        }
+        (0..8).for_each(|lane| self.closest_in(lane, ray, index, nearest));
     }
 
     /// [`Packet::any`] without the instructions for eight at a time.

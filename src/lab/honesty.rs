@@ -2,13 +2,11 @@
 
 use super::run::Timed;
 use super::{LabError, Reference, Subject};
+use crate::render::LEAST_ROUNDS;
 use serde_json::json;
 
 /// The errors that are asked for.
 pub const TARGETS: [f64; 3] = [0.1, 0.05, 0.02];
-
-/// A render never stops by its error after fewer rounds.
-const LEAST_ROUNDS: u32 = 2;
 
 /// What became of many renders that were asked for one error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -76,9 +76,9 @@ pub fn trace_image(
             traced
         })
         .collect::<Result<Vec<_>, RenderError>>()?;
+    let (tiles, of_tiles): (Vec<_>, Vec<_>) = tiles.into_iter().unzip();
     let mut counts = EyeCounts::default();
-    tiles.iter().for_each(|(_, of_tile)| counts.add(of_tile));
-    let tiles = tiles.into_iter().map(|(tile, _)| tile).collect();
+    of_tiles.iter().for_each(|of_tile| counts.add(of_tile));
     Ok((RoundFilm::new(image.width, TILE, tiles), counts))
 }
 

@@ -11,7 +11,7 @@ use crate::light_path::Kind;
 use crate::pass1_light::{LightImage, Spread};
 use crate::photon_map::Photon;
 use crate::sampling::hash;
-use crate::scene::{Camera, Projection};
+use crate::scene::Camera;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -126,12 +126,8 @@ impl Screen<'_> {
     /// Whether the eye looks at the side on which light comes to rest. What lies behind on the same sheet, on the far side of a
     /// ball, has its place on the screen too.
     fn sees(&self, position: Vec3, direction: Vec3, normal: Vec3) -> bool {
-        let to_eye = match self.camera.projection {
-            Projection::Perspective { .. } => self.camera.eye - position,
-            Projection::Orthographic { .. } => -self.camera.forward,
-        };
-        // On the same side of the surface as the light comes from.
-        normal.dot(direction) * normal.dot(to_eye) < 0.0
+        // On the side of the surface that the light comes from.
+        normal.dot(direction) * normal.dot(self.camera.to_eye(position)) < 0.0
     }
 
     fn place(&self, light: Light, patches: &mut Vec<Placed<'_>>) {

@@ -191,6 +191,16 @@ impl Camera {
         Some((ndc + 1.0) * 0.5 * self.resolution)
     }
 
+    /// From a point toward where it is seen from, through the middle of the lens; of any length.
+    #[inline]
+    #[must_use]
+    pub fn to_eye(&self, point: Vec3) -> Vec3 {
+        match self.projection {
+            Projection::Perspective { .. } => self.eye - point,
+            Projection::Orthographic { .. } => -self.forward,
+        }
+    }
+
     /// Width of a pixel at a distance from the eye.
     #[must_use]
     pub fn pixel_width(&self, distance: f32) -> f32 {

@@ -1,15 +1,19 @@
 //! The picture: layers, footprints, smoothing, and the estimate of its error.
 
-use crate::support::{SEEDS, camera_above, compile, floor, render, scene};
+use crate::support::{Estimate, SEEDS, T_LIMIT, camera_above, compile, floor, mean, render, scene};
 use glam::{DVec3, Vec3};
+use nephroid::compare::compare;
 use nephroid::geometry::Ray;
 use nephroid::image_io::LinearImage;
 use nephroid::light_path::PathClass;
 use nephroid::media::Media;
 use nephroid::pass2_eye::Footprints;
 use nephroid::photon_map::{Photon, PhotonMap};
+use nephroid::plan::Plan;
+use nephroid::render::{Control, Render};
 use nephroid::sampling::SamplePoint;
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// The floor lit by the image of a point light in a mirror at x = 1, seen from above: 40 cm around x = 0.5.
 fn mirrored_light(width: f64, pixels: u32) -> Value {
@@ -180,4 +184,57 @@ fn the_estimated_error_is_hardly_less_than_the_true_one() {
     }
     let ratio = (estimated / actual).sqrt();
     assert!((1.0 / 1.5..3.0).contains(&ratio), "estimated over true: {ratio}");
+}
+
+/// A lamp three hundred times as bright as the mean of the wall behind it.
+fn lamp_before_a_wall() -> Value {
+    let wall = json!({ "type": "polygon", "material": "floor", "vertices": [[-2, -2, -1], [2, -2, -1], [2, 2, -1], [-2, 2, -1]] });
+    let lamp = json!({ "type": "sphere", "center": [0, 0, 0], "radius": 0.1, "radiance": [100, 100, 100] });
+    let camera =
+        json!({ "type": "perspective", "eye": [0.03, 0.02, 3], "target": [0.03, 0.02, 0], "fov": 40 });
+    let mut value = scene(camera, json!([wall]), json!([lamp]));
+    value["image"] = json!({ "width": 48, "height": 48 });
+    value
+}
+
+/// Each pixel as often as every other, or as a pilot with another seed wants it.
+fn unbiased(value: &Value, (seed, rounds): (u64, u32), pilot: Option<&Render>) -> LinearImage {
+    let mut scene = compile(value);
+    scene.render.seed = seed;
+    let scene = Arc::new(scene);
+    let render = Render::new(Arc::clone(&scene), Plan::new(&scene));
+    let mut render = if let Some(pilot) = pilot { render.sampled_as(pilot) } else { render.evenly() };
+    for _ in 0..rounds {
+        render.run_round(&Control::new()).unwrap();
+    }
+    render.image()
+}
+
+/// At its outline the two first samples of a pixel meet the lamp or the wall, three hundred times darker: the error of a first round is
+/// that of few pixels, and the estimate in the mean over seeds within the factors of the test above.
+#[test]
+fn the_outline_of_a_lamp_does_not_hold_the_estimate_up() {
+    let value = lamp_before_a_wall();
+    let truth = unbiased(&value, (99, 256), None);
+    let (mut estimated, mut actual) = (0.0, 0.0);
+    for seed in 1..=SEEDS {
+        let render = render(&value, seed, 1, 10);
+        actual += compare(&render.image(), &truth, None).unwrap().relmse;
+        estimated += f64::from(render.error_estimate().unwrap()).powi(2);
+    }
+    let ratio = (estimated / actual).sqrt();
+    assert!((1.0 / 1.5..3.0).contains(&ratio), "estimated over true: {ratio}");
+}
+
+/// A pilot that found where the lamp is leaves the mean as it is, and its noise less than half as large.
+#[test]
+fn a_pilot_makes_no_bias() {
+    let value = lamp_before_a_wall();
+    let pilot = render(&value, 99, 8, 10);
+    let over_seeds = |pilot: Option<&Render>| {
+        Estimate::of(&(1..=SEEDS).map(|seed| mean(&unbiased(&value, (seed, 4), pilot))).collect::<Vec<_>>())
+    };
+    let (with, without) = (over_seeds(Some(&pilot)), over_seeds(None));
+    assert!(with.distance(without, 0.0).abs() < T_LIMIT, "{with:?} {without:?}");
+    assert!(2.0 * with.standard_error < without.standard_error, "{with:?} {without:?}");
 }
