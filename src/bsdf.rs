@@ -79,7 +79,7 @@ impl Bsdf {
     /// `line` picks a wavelength where light of all is taken apart.
     #[must_use]
     pub fn new(arrival: &Arrival<'_>, line: impl Fn() -> Line) -> Option<Self> {
-        let material = arrival.material();
+        let material = arrival.material;
         if !material.has_diffuse() {
             return None;
         }
@@ -117,9 +117,9 @@ impl Bsdf {
     }
 
     fn add(&mut self, material: &Material, share: f32, arrival: &Arrival<'_>, line: &impl Fn() -> Line) {
-        let uv = arrival.hit.surface.uv;
+        let at = arrival.hit.surface.texture;
         match material {
-            Material::Diffuse { albedo } => self.push(Lobe::Lambert { albedo: albedo.eval(uv) }, share),
+            Material::Diffuse { albedo } => self.push(Lobe::Lambert { albedo: albedo.eval(at) }, share),
             Material::Mirror { .. }
             | Material::Metal { alpha: None, .. }
             | Material::Glass { alpha: None, .. } => {}
@@ -139,12 +139,12 @@ impl Bsdf {
                 }
             }
             Material::Phong(phong) => {
-                self.push(Lobe::Lambert { albedo: phong.k_d.eval(uv) }, share);
+                self.push(Lobe::Lambert { albedo: phong.k_d.eval(at) }, share);
                 let (k_s, exponent, form) = (phong.k_s, phong.exponent, phong.highlight);
                 self.push(Lobe::Highlight { k_s, exponent, form }, share);
             }
             Material::Mix(mix) => {
-                for (part, amount) in mix.shares(uv) {
+                for (part, amount) in mix.shares(at) {
                     self.add(part, share * amount, arrival, line);
                 }
             }

@@ -105,7 +105,8 @@ impl Media {
     /// inside, whatever was known.
     #[inline]
     #[must_use]
-    pub fn arriving(self, material: MaterialId, leaving: bool) -> Self {
+    pub fn arriving(self, surface: Crossed) -> Self {
+        let Crossed { material, leaving } = surface;
         if leaving && self.entered().all(|m| m != material) { self.with(material) } else { self }
     }
 
@@ -114,7 +115,7 @@ impl Media {
     #[inline]
     #[must_use]
     pub fn interface(self, scene: &Scene, surfaces: &[Crossed], wavelength: Option<f32>) -> Interface {
-        let before = surfaces.iter().filter(|s| s.leaving).fold(self, |m, s| m.arriving(s.material, true));
+        let before = surfaces.iter().fold(self, |media, surface| media.arriving(*surface));
         let after = surfaces.iter().filter(|s| s.leaving).fold(before, |m, s| m.without(s.material));
         let after = surfaces.iter().filter(|s| !s.leaving).fold(after, |m, s| m.with(s.material));
         let hidden = before.filler(scene) == after.filler(scene);
@@ -192,7 +193,8 @@ mod tests {
     #[test]
     fn arriving_from_within_overrules_what_was_known() {
         let a = MaterialId(4);
-        assert_eq!(Media::default().arriving(a, true), Media::default().with(a));
-        assert_eq!(Media::default().with(a).arriving(a, true), Media::default().with(a));
+        let from_within = Crossed { material: a, leaving: true };
+        assert_eq!(Media::default().arriving(from_within), Media::default().with(a));
+        assert_eq!(Media::default().with(a).arriving(from_within), Media::default().with(a));
     }
 }

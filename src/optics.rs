@@ -8,6 +8,7 @@ use crate::geometry::{Hit, Ray, SurfacePoint, offset_origin};
 use crate::media::{Crossed, Interface, Media};
 use crate::scene::{Material, MaterialId, Scene};
 use crate::spectrum::Line;
+use arrayvec::ArrayVec;
 use glam::Vec3;
 
 /// Which way a ray leaves a specular surface.
@@ -65,6 +66,8 @@ pub struct Arrival<'a> {
     pub scene: &'a Scene,
     /// Where it arrives.
     pub hit: &'a Hit,
+    /// What the surface is made of.
+    pub material: &'a Material,
     /// Unit direction in which it travels.
     pub direction: Vec3,
     /// What it has come through.
@@ -82,10 +85,12 @@ impl<'a> Arrival<'a> {
     #[must_use]
     pub fn new(scene: &'a Scene, ray: &Ray, hit: &'a Hit, known: Media, wavelength: Option<f32>) -> Self {
         let (direction, error) = (ray.direction, hit.surface.error);
-        let mut arrival = Self { scene, hit, direction, media: known, wavelength, touching: None, error };
-        if arrival.material().dielectric().is_some() {
+        let material = scene.material_of(hit.object);
+        let mut arrival =
+            Self { scene, hit, material, direction, media: known, wavelength, touching: None, error };
+        if material.dielectric().is_some() {
             arrival.touch(ray);
-            arrival.media = arrival.interface(None).before;
+            arrival.media = arrival.surfaces().into_iter().fold(known, Media::arriving);
         }
         arrival
     }
@@ -111,13 +116,6 @@ impl<'a> Arrival<'a> {
         }
     }
 
-    /// What the surface is made of.
-    #[inline]
-    #[must_use]
-    pub fn material(&self) -> &'a Material {
-        self.scene.material_of(self.hit.object)
-    }
-
     fn material_id(&self) -> MaterialId {
         self.scene.objects[self.hit.object.index()].material
     }
@@ -136,8 +134,7 @@ impl<'a> Arrival<'a> {
     /// What the surface's S part does to the ray. `line` picks a wavelength where light of all is taken apart.
     #[must_use]
     pub fn interact(&self, line: impl Fn() -> Line) -> Interaction {
-        let material = self.material();
-        let mut interaction = self.part(material, &line);
+        let mut interaction = self.part(self.material, &line);
         for outcome in [&mut interaction.reflected, &mut interaction.refracted].into_iter().flatten() {
             outcome.wavelength = outcome.wavelength.or(self.wavelength);
         }
@@ -156,7 +153,7 @@ impl<'a> Arrival<'a> {
             Material::Glass { alpha, .. } => self.glass(alpha.is_some(), line),
             Material::Phong(phong) => self.lecture(phong.k_r, phong.k_t, line),
             Material::Mix(mix) => {
-                let [a, b] = mix.shares(self.hit.surface.uv);
+                let [a, b] = mix.shares(self.hit.surface.texture);
                 self.part(a.0, line).times(a.1).and(self.part(b.0, line).times(b.1))
             }
         }
@@ -196,15 +193,16 @@ impl<'a> Arrival<'a> {
     /// The surface as one between two media, for light of a wavelength in μm.
     #[must_use]
     pub fn interface(&self, wavelength: Option<f32>) -> Interface {
+        self.media.interface(self.scene, &self.surfaces(), wavelength)
+    }
+
+    /// The dielectrics' surfaces that lie here, in an order that does not depend on which of them was found first.
+    #[inline]
+    fn surfaces(&self) -> ArrayVec<Crossed, 2> {
         let own = Crossed { material: self.material_id(), leaving: self.leaves() };
-        match self.touching {
-            None => self.media.interface(self.scene, &[own], wavelength),
-            Some(other) => {
-                // In an order that does not depend on which of them was found first.
-                let (first, last) = if own.material < other.material { (own, other) } else { (other, own) };
-                self.media.interface(self.scene, &[first, last], wavelength)
-            }
-        }
+        let mut surfaces: ArrayVec<Crossed, 2> = std::iter::once(own).chain(self.touching).collect();
+        surfaces.sort_unstable_by_key(|surface| surface.material);
+        surfaces
     }
 
     fn crossing(&self, line: &impl Fn() -> Line) -> Crossing {

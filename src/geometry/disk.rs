@@ -2,7 +2,7 @@
 
 use super::bounds::Bounds;
 use super::polygon::epanechnikov_half_plane;
-use super::{HullPoint, Ray, SurfacePoint};
+use super::{HullPoint, Ray, SurfacePoint, TextureCoordinates};
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::{PI, TAU};
 
@@ -56,7 +56,10 @@ impl Disk {
             error: point.abs().max(self.center.as_vec3().abs()).max_element() * f32::EPSILON,
             normal,
             shading_normal: normal,
-            uv: Vec2::new(local.dot(self.along) as f32, local.dot(self.normal.cross(self.along)) as f32),
+            texture: TextureCoordinates::Uv(Vec2::new(
+                local.dot(self.along) as f32,
+                local.dot(self.normal.cross(self.along)) as f32,
+            )),
         }
     }
 
@@ -159,7 +162,7 @@ impl Cylinder {
             error: point.abs().max(self.from.as_vec3().abs()).max_element() * f32::EPSILON,
             normal,
             shading_normal: normal,
-            uv: Vec2::new(turn as f32 + 0.5, (height / self.length) as f32),
+            texture: TextureCoordinates::Uv(Vec2::new(turn as f32 + 0.5, (height / self.length) as f32)),
         }
     }
 

@@ -26,8 +26,8 @@ pub use builder::{GeometryBuilder, SharedMeshId};
 pub use mesh::MeshData;
 pub use motion::{Motion, Turn};
 pub use polygon::PolygonError;
-pub use ray::{Ray, offset_origin};
-pub use sphere::roots as sphere_roots;
+pub use ray::{Ray, offset_distance, offset_origin};
+pub use sphere::sphere_roots;
 
 use crate::scene::ObjectId;
 use accel::Accel;
@@ -40,6 +40,7 @@ use moving::Moving;
 use nearest::{Areas, Nearest, Place};
 use packet::ShearedRay;
 use polygon::{Edge, Polygon};
+use ray::WideRay;
 use sphere::Sphere;
 use std::sync::Arc;
 
@@ -93,8 +94,28 @@ pub struct SurfacePoint {
     pub normal: Vec3,
     /// Unit interpolated normal, on the same side.
     pub shading_normal: Vec3,
-    /// Texture coordinates.
-    pub uv: Vec2,
+    /// Where that is on a texture.
+    pub texture: TextureCoordinates,
+}
+
+/// Texture coordinates: of a sphere only once a texture asks for them, as they take arc functions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TextureCoordinates {
+    /// Known.
+    Uv(Vec2),
+    /// Those of the point of a sphere with this unit normal.
+    OnSphere(Vec3),
+}
+
+impl TextureCoordinates {
+    /// The coordinates.
+    #[must_use]
+    pub fn uv(self) -> Vec2 {
+        match self {
+            Self::Uv(uv) => uv,
+            Self::OnSphere(normal) => sphere::sphere_uv(normal),
+        }
+    }
 }
 
 /// Where a ray first meets a surface.
@@ -203,7 +224,7 @@ impl Geometry {
     /// True if any surface lies strictly between the ray's origin and the distance `t_max`.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray, t_max: f32) -> bool {
-        let others = |run: Run| self.entries(run).any(|(_, e)| self.meets(e, ray, t_max));
+        let others = |run: Run| self.any_of_run(run, ray, t_max);
         match &self.accel {
             Accel::List(words) => self.any_of_list(words, ray, t_max),
             Accel::Bvh(bvh) => bvh.any(&self.leaves, ray, t_max, others),
@@ -235,17 +256,16 @@ impl Geometry {
         match place {
             Place::Triangle(slot) => self.leaves.triangle(slot).intersect(sheared, t_max).is_some(),
             Place::Entry(entry) | Place::Instance(entry, _) => {
-                self.meets(&self.leaves.entries[entry as usize], ray, t_max)
+                self.any_of_run(Run { first: entry as usize, count: 1 }, ray, t_max)
             }
         }
     }
 
     fn closest_of_list(&self, words: &[Word], ray: &Ray, nearest: &mut Nearest) {
-        let sheared = ShearedRay::new(ray);
         for word in words {
             match word.child() {
                 Child::Packet(index) => {
-                    self.leaves.packets[index].closest_one_by_one(&sheared, index, nearest)
+                    self.leaves.packets[index].closest_one_by_one(&ShearedRay::new(ray), index, nearest)
                 }
                 Child::Run(run) => self.closest_of_run(run, ray, nearest),
                 Child::Node(_) => {}
@@ -254,22 +274,22 @@ impl Geometry {
     }
 
     fn any_of_list(&self, words: &[Word], ray: &Ray, t_max: f32) -> bool {
-        let sheared = ShearedRay::new(ray);
         words.iter().any(|word| match word.child() {
-            Child::Packet(index) => self.leaves.packets[index].any_one_by_one(&sheared, t_max),
-            Child::Run(run) => self.entries(run).any(|(_, e)| self.meets(e, ray, t_max)),
+            Child::Packet(index) => self.leaves.packets[index].any_one_by_one(&ShearedRay::new(ray), t_max),
+            Child::Run(run) => self.any_of_run(run, ray, t_max),
             Child::Node(_) => false,
         })
     }
 
     #[inline]
     fn closest_of_run(&self, run: Run, ray: &Ray, nearest: &mut Nearest) {
+        let wide = WideRay::new(ray);
         for (index, entry) in self.entries(run) {
             let (t_max, index, mut areas) = (nearest.limit(), index as u32, Areas::NONE);
             let (hit, place) = match entry.shape {
-                Shape::Sphere(i) => (self.spheres[i as usize].intersect(ray, t_max), Place::Entry(index)),
+                Shape::Sphere(i) => (self.spheres[i as usize].intersect(&wide, t_max), Place::Entry(index)),
                 Shape::Polygon(i) => {
-                    (self.polygons[i as usize].intersect(ray, t_max, &self.edges), Place::Entry(index))
+                    (self.polygons[i as usize].intersect(&wide, t_max, &self.edges), Place::Entry(index))
                 }
                 Shape::Disk(i) => (self.disks[i as usize].intersect(ray, t_max), Place::Entry(index)),
                 Shape::Cylinder(i) => (self.cylinders[i as usize].intersect(ray, t_max), Place::Entry(index)),
@@ -292,15 +312,16 @@ impl Geometry {
     }
 
     #[inline]
-    fn meets(&self, entry: &Entry, ray: &Ray, t_max: f32) -> bool {
-        match entry.shape {
-            Shape::Polygon(i) => self.polygons[i as usize].intersect(ray, t_max, &self.edges).is_some(),
-            Shape::Sphere(i) => self.spheres[i as usize].intersect(ray, t_max).is_some(),
+    fn any_of_run(&self, run: Run, ray: &Ray, t_max: f32) -> bool {
+        let wide = WideRay::new(ray);
+        self.entries(run).any(|(_, entry)| match entry.shape {
+            Shape::Polygon(i) => self.polygons[i as usize].intersect(&wide, t_max, &self.edges).is_some(),
+            Shape::Sphere(i) => self.spheres[i as usize].intersect(&wide, t_max).is_some(),
             Shape::Disk(i) => self.disks[i as usize].intersect(ray, t_max).is_some(),
             Shape::Cylinder(i) => self.cylinders[i as usize].intersect(ray, t_max).is_some(),
             Shape::Instance(i) => self.instances[i as usize].any(ray, t_max, &self.shared),
             Shape::Moving(i) => self.moving[i as usize].any(ray, t_max),
-        }
+        })
     }
 
     /// The owner of a primitive.

@@ -62,6 +62,7 @@ impl Nearest {
     /// Hits below this distance may still count.
     #[inline]
     pub(super) fn limit(&self) -> f32 {
-        self.t.next_up()
+        // The next float after one that is not negative.
+        f32::from_bits(self.t.to_bits() + 1)
     }
 }

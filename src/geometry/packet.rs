@@ -7,7 +7,7 @@
 use super::bounds::Bounds;
 use super::nearest::{Areas, Nearest, Place};
 use super::simd::{Column, Lanes};
-use super::{Ray, SurfacePoint};
+use super::{Ray, SurfacePoint, TextureCoordinates};
 use glam::{Vec2, Vec3, Vec3A};
 
 /// The corners of a triangle.
@@ -104,7 +104,7 @@ impl Triangle {
             error: size.max_element() * (3.5 * f32::EPSILON),
             normal,
             shading_normal,
-            uv: p * weights.x + q * weights.y + r * weights.z,
+            texture: TextureCoordinates::Uv(p * weights.x + q * weights.y + r * weights.z),
         }
     }
 

@@ -2,7 +2,8 @@
 //! neither overlap nor leave a gap.
 
 use super::bounds::Bounds;
-use super::{Ray, SurfacePoint};
+use super::ray::WideRay;
+use super::{Ray, SurfacePoint, TextureCoordinates};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// A planar polygon, concave or with holes. Its corners, projected along the normal's largest component,
@@ -26,11 +27,22 @@ pub(super) struct Polygon {
     corners: Vec<Vec3>,
 }
 
-/// One edge of a polygon, projected.
+/// One edge of a polygon, projected. It is the same one for all polygons that share it, so that they agree on which side
+/// of it a point lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Edge {
-    from: DVec2,
-    to: DVec2,
+    /// The lower end.
+    low: DVec2,
+    high: DVec2,
+    /// How far it goes across per height.
+    slope: f64,
+}
+
+impl Edge {
+    fn new(a: DVec2, b: DVec2) -> Self {
+        let (low, high) = if a.y < b.y { (a, b) } else { (b, a) };
+        Self { low, high, slope: (high.x - low.x) / (high.y - low.y) }
+    }
 }
 
 /// What is wrong with a polygon.
@@ -67,7 +79,7 @@ impl Polygon {
         for outline in outlines {
             for (i, a) in outline.iter().enumerate() {
                 let b = outline[(i + 1) % outline.len()];
-                edges.push(Edge { from: plane.project(*a), to: plane.project(b) });
+                edges.push(Edge::new(plane.project(*a), plane.project(b)));
             }
         }
         let outline = &outlines[0];
@@ -87,45 +99,36 @@ impl Polygon {
 
     /// Distance along the ray in `(0, t_max)`; a ray in the polygon's own plane misses.
     #[inline]
-    pub(super) fn intersect(&self, ray: &Ray, t_max: f32, edges: &[Edge]) -> Option<f32> {
-        let direction = ray.direction.as_dvec3();
-        let t = self.plane_distance(ray, direction)?;
+    pub(super) fn intersect(&self, ray: &WideRay, t_max: f32, edges: &[Edge]) -> Option<f32> {
+        let t = self.plane_distance(ray)?;
         if !(t > 0.0 && (t as f32) < t_max) {
             return None;
         }
-        let p = ray.origin.as_dvec3() + direction * t;
+        let p = ray.at(t);
         self.contains(DVec2::new(p[self.axes[0]], p[self.axes[1]]), edges).then_some(t as f32)
     }
 
     #[inline]
-    fn plane_distance(&self, ray: &Ray, direction: DVec3) -> Option<f64> {
-        let slope = self.normal.dot(direction);
-        let t = (self.offset - self.normal.dot(ray.origin.as_dvec3())) / slope;
+    fn plane_distance(&self, ray: &WideRay) -> Option<f64> {
+        let t = (self.offset - self.normal.dot(ray.origin)) / self.normal.dot(ray.direction);
         // Parallel rays give an infinite or undefined distance.
         t.is_finite().then_some(t)
     }
 
-    /// Even-odd rule; an edge counts if exactly one of its ends lies strictly above the point.
+    /// Even-odd rule; an edge counts if exactly its upper end lies strictly above the point.
     #[inline]
     fn contains(&self, p: DVec2, edges: &[Edge]) -> bool {
         let mut inside = false;
         for edge in &edges[self.edges.start as usize..self.edges.end as usize] {
-            let (a, b) = (edge.from, edge.to);
-            if (a.y > p.y) != (b.y > p.y) {
-                // Both ends are taken in the same order for both polygons that share the edge, so that they
-                // agree on which side the point lies.
-                let (low, high) = if a.y < b.y { (a, b) } else { (b, a) };
-                let x = low.x + (p.y - low.y) / (high.y - low.y) * (high.x - low.x);
-                inside ^= p.x < x;
-            }
+            let x = edge.low.x + (p.y - edge.low.y) * edge.slope;
+            inside ^= (edge.low.y <= p.y) & (p.y < edge.high.y) & (p.x < x);
         }
         inside
     }
 
     pub(super) fn surface(&self, ray: &Ray, t: f32) -> SurfacePoint {
-        let direction = ray.direction.as_dvec3();
-        let t = self.plane_distance(ray, direction).unwrap_or(f64::from(t));
-        let p = ray.origin.as_dvec3() + direction * t;
+        let ray = WideRay::new(ray);
+        let p = ray.at(self.plane_distance(&ray).unwrap_or(f64::from(t)));
         let p = p - self.normal * (self.normal.dot(p) - self.offset);
         let local = p - self.origin;
         let across = self.normal.cross(self.along);
@@ -137,7 +140,10 @@ impl Polygon {
             error: point.abs().max_element() * f32::EPSILON,
             normal,
             shading_normal: normal,
-            uv: Vec2::new(local.dot(self.along) as f32, local.dot(across) as f32),
+            texture: TextureCoordinates::Uv(Vec2::new(
+                local.dot(self.along) as f32,
+                local.dot(across) as f32,
+            )),
         }
     }
 
@@ -162,13 +168,13 @@ impl Polygon {
         let reach = f64::from(radius);
         let mut mass = 1.0;
         for edge in &edges[self.edges.start as usize..self.edges.end as usize] {
-            let low = edge.from.min(edge.to) - reach;
-            let high = edge.from.max(edge.to) + reach;
+            let low = edge.low.min(edge.high) - reach;
+            let high = edge.low.max(edge.high) + reach;
             if projected.cmplt(low).any() || projected.cmpgt(high).any() {
                 continue;
             }
-            let from = self.lift(edge.from, dropped);
-            let to = self.lift(edge.to, dropped);
+            let from = self.lift(edge.low, dropped);
+            let to = self.lift(edge.high, dropped);
             let s = ((p - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
             let distance = (p - from.lerp(to, s)).length();
             if distance < reach {

@@ -1,6 +1,6 @@
 //! Rays, and the one rule that keeps a new ray off the surface it starts from.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// A ray from `origin` along the unit vector `direction`, at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +44,36 @@ impl Ray {
     }
 }
 
+/// A ray in f64, for primitives that are tested there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WideRay {
+    pub(super) origin: DVec3,
+    pub(super) direction: DVec3,
+    /// Squared length of the direction, which is 1 only to the rounding of f32.
+    pub(super) square: f64,
+    /// One over it.
+    pub(super) inverse_square: f64,
+}
+
+impl WideRay {
+    #[inline]
+    pub(super) fn new(ray: &Ray) -> Self {
+        Self::of(ray.origin.as_dvec3(), ray.direction.as_dvec3())
+    }
+
+    #[inline]
+    pub(super) fn of(origin: DVec3, direction: DVec3) -> Self {
+        let square = direction.length_squared();
+        Self { origin, direction, square, inverse_square: 1.0 / square }
+    }
+
+    /// The point at distance `t`.
+    #[inline]
+    pub(super) fn at(&self, t: f64) -> DVec3 {
+        self.origin + self.direction * t
+    }
+}
+
 /// Moves a surface point off its surface to the side of `direction`, by no more than the point may be
 /// wrong: `error` bounds how far the rounded point lies from the true surface. A ray that starts at the
 /// result and leaves to that side cannot meet the same flat or convex piece of surface again. There is no
@@ -62,16 +92,22 @@ pub fn offset_origin(point: Vec3, error: f32, normal: Vec3, direction: Vec3) -> 
 /// Rounds `moved` one step further along `side`, so that rounding the sum cannot undo the move.
 #[inline]
 fn away(point: f32, moved: f32, side: f32) -> f32 {
-    if moved == point && side.abs() < 1e-3 {
+    if side == 0.0 || (moved == point && side.abs() < 1e-3) {
         return moved;
     }
-    if side > 0.0 {
-        moved.next_up()
-    } else if side < 0.0 {
-        moved.next_down()
-    } else {
-        moved
+    if moved == 0.0 {
+        return f32::from_bits(1).copysign(side);
     }
+    // Floats of one sign are in the order of their bits.
+    let outward = (moved > 0.0) == (side > 0.0);
+    f32::from_bits(if outward { moved.to_bits() + 1 } else { moved.to_bits() - 1 })
+}
+
+/// Bound on how far [`offset_origin`] moves a point along the normal.
+#[inline]
+#[must_use]
+pub fn offset_distance(point: Vec3, error: f32, normal: Vec3) -> f32 {
+    (error + point.abs().max_element() * (2.0 * f32::EPSILON)) * normal.abs().element_sum()
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Ray against sphere, by the quadratic that does not cancel.
 
 use super::bounds::Bounds;
-use super::{Ray, SurfacePoint};
+use super::ray::WideRay;
+use super::{Ray, SurfacePoint, TextureCoordinates};
 use glam::{DVec3, Vec2, Vec3};
 
 /// A sphere; its normal points outwards.
@@ -16,27 +17,24 @@ pub(super) struct Sphere {
 impl Sphere {
     /// Distance along the ray to the nearest point in `(0, t_max)`.
     #[inline]
-    pub(super) fn intersect(&self, ray: &Ray, t_max: f32) -> Option<f32> {
-        let (near, far) = roots(
-            ray.origin.as_dvec3(),
-            ray.direction.as_dvec3(),
-            self.center.as_dvec3(),
-            f64::from(self.radius),
-        )?;
-        let t = if near > 0.0 { near } else { far } as f32;
+    pub(super) fn intersect(&self, ray: &WideRay, t_max: f32) -> Option<f32> {
+        let t = self.first_root(ray)? as f32;
         (t > 0.0 && t < t_max).then_some(t)
+    }
+
+    /// The nearer root that lies before the ray, or the farther.
+    #[inline]
+    fn first_root(&self, ray: &WideRay) -> Option<f64> {
+        let (near, far) = roots(ray, self.center.as_dvec3(), f64::from(self.radius))?;
+        Some(if near > 0.0 { near } else { far })
     }
 
     /// The surface where the ray meets it at about `t`, with the point put back onto the sphere.
     pub(super) fn surface(&self, ray: &Ray, t: f32) -> SurfacePoint {
-        let center = self.center.as_dvec3();
-        // The rounded distance is only a hint of which of the two roots was meant: far away it is too coarse
-        // to tell where on a small sphere the ray arrives.
-        let (near, far) =
-            roots(ray.origin.as_dvec3(), ray.direction.as_dvec3(), center, f64::from(self.radius))
-                .unwrap_or((f64::from(t), f64::from(t)));
-        let t = if near > 0.0 { near } else { far };
-        let arrival = ray.origin.as_dvec3() + ray.direction.as_dvec3() * t - center;
+        let (center, ray) = (self.center.as_dvec3(), WideRay::new(ray));
+        // The rounded distance is too coarse, far away, to tell where on a small sphere the ray arrives.
+        let t = self.first_root(&ray).unwrap_or(f64::from(t));
+        let arrival = ray.at(t) - center;
         let normal = arrival.normalize_or(DVec3::Y);
         let point = (center + normal * f64::from(self.radius)).as_vec3();
         let normal = normal.as_vec3();
@@ -46,7 +44,7 @@ impl Sphere {
             error: point.abs().max(self.center.abs()).max_element() * f32::EPSILON,
             normal,
             shading_normal: normal,
-            uv: sphere_uv(normal),
+            texture: TextureCoordinates::OnSphere(normal),
         }
     }
 
@@ -56,7 +54,7 @@ impl Sphere {
 }
 
 /// Once around, to the right seen from outside, and from bottom to top, each 0..1; the middle faces +z.
-fn sphere_uv(normal: Vec3) -> Vec2 {
+pub(super) fn sphere_uv(normal: Vec3) -> Vec2 {
     use std::f32::consts::{PI, TAU};
     let longitude = libm::atan2f(normal.x, normal.z) / TAU + 0.5;
     Vec2::new(longitude, 1.0 - libm::acosf(normal.y.clamp(-1.0, 1.0)) / PI)
@@ -67,25 +65,30 @@ fn sphere_uv(normal: Vec3) -> Vec2 {
 /// Neither the discriminant nor the smaller root is a difference of large numbers: with `f = origin -
 /// center` and `l` the part of `f` perpendicular to the ray, the discriminant is `r² - l·l`, and the root
 /// that would cancel is `c / q` with `c = |f|² - r²` summed without rounding (Haines et al., *Ray Tracing Gems*, ch. 7).
-/// `direction` need not be exactly of unit length.
+/// `direction` need not be of unit length.
 #[must_use]
-pub fn roots(origin: DVec3, direction: DVec3, center: DVec3, radius: f64) -> Option<(f64, f64)> {
-    let a = direction.length_squared();
+pub fn sphere_roots(origin: DVec3, direction: DVec3, center: DVec3, radius: f64) -> Option<(f64, f64)> {
+    roots(&WideRay::of(origin, direction), center, radius)
+}
+
+#[inline]
+fn roots(ray: &WideRay, center: DVec3, radius: f64) -> Option<(f64, f64)> {
+    let WideRay { origin, direction, square, inverse_square } = *ray;
     let f = origin - center;
     let b = f.dot(direction);
-    let perpendicular = f - direction * (b / a);
+    let perpendicular = f - direction * (b * inverse_square);
     let discriminant = radius * radius - perpendicular.length_squared();
     if discriminant < 0.0 || discriminant.is_nan() {
         return None;
     }
     let c = squared_length_minus(f, radius);
-    let half_chord = (a * discriminant).sqrt();
+    let half_chord = (square * discriminant).sqrt();
     // The sum of two numbers of one sign.
     let q = if b > 0.0 { -b - half_chord } else { -b + half_chord };
     if q == 0.0 {
         return None;
     }
-    let (t0, t1) = (c / q, q / a);
+    let (t0, t1) = (c / q, q * inverse_square);
     Some(if t0 < t1 { (t0, t1) } else { (t1, t0) })
 }
 

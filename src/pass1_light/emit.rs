@@ -3,7 +3,7 @@
 use super::window::{Region, Source, Window};
 use crate::geometry::{Ray, offset_origin};
 use crate::sampling::{SamplePoint, concentric_disc, cone_direction, cosine_hemisphere, uniform_sphere};
-use crate::scene::{Environment, Light, LightPoint, QuadLight, Scene, SphereLight, SpotLight};
+use crate::scene::{Environment, Light, LightPoint, Scene, SphereLight, SpotLight};
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
@@ -97,7 +97,7 @@ impl<'a> Emission<'a> {
             }
             Sampler::Light(Light::Spot(spot)) => self.emit_from_spot(spot, through),
             Sampler::Light(Light::Quad(quad)) => {
-                let point = point_on_quad(quad, on_light);
+                let point = quad.point(on_light * 2.0 - 1.0);
                 self.emit_from_point(&Origin::on(&point, quad.radiance * quad.area()), through)
             }
             Sampler::Light(Light::Disk(disk)) => {
@@ -223,11 +223,4 @@ impl Origin {
         let point = offset_origin(light.point, light.error, light.normal, light.normal);
         Self { point, strength, normal: Some(light.normal) }
     }
-}
-
-fn point_on_quad(quad: &QuadLight, u: Vec2) -> LightPoint {
-    let p = u * 2.0 - 1.0;
-    let point = quad.center + quad.half_u * p.x + quad.half_v * p.y;
-    let error = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element() * f32::EPSILON;
-    LightPoint { point, normal: quad.normal, error: 2.0 * error }
 }

@@ -106,7 +106,7 @@ impl<'a> PhotonWalk<'a> {
             let interaction = arrival.interact(|| spectrum::pick(sample.get(WAVELENGTH_DIMENSION)));
             // What rests on the first surface is direct light: not the photons' part.
             if bounce > 0
-                && arrival.material().has_diffuse()
+                && arrival.material.has_diffuse()
                 && let Some(kind) = self.kind(bounce)
             {
                 let resting = power * (Vec3::ONE - interaction.share());

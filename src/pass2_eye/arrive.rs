@@ -110,8 +110,8 @@ impl EyeWalk<'_> {
     fn see_emitter(&mut self, branch: &Branch, arrival: &Arrival<'_>, sums: &mut PixelSums) {
         let scene = self.context.scene;
         let surface = &arrival.hit.surface;
-        if branch.scattered.is_none() {
-            let radiance = arrival.material().glow(surface.uv);
+        if branch.scattered.is_none() && arrival.material.glows() {
+            let radiance = arrival.material.glow(surface.texture);
             self.add(branch, PathClass::Emitted, (self.pictures_of_glow(branch), radiance), sums);
         }
         let Some(id) = scene.objects[arrival.hit.object.index()].emitter else { return };

@@ -135,8 +135,10 @@ pub(super) fn direct_light(
             }
         }
     }
-    let incident = from_environment(receiver, &scene.environment, sample.get_2d(4));
-    tell(Source::Environment, receiver.visible(incident, shadow_rays));
+    if !scene.environment.is_black() {
+        let incident = from_environment(receiver, &scene.environment, sample.get_2d(4));
+        tell(Source::Environment, receiver.visible(incident, shadow_rays));
+    }
 }
 
 /// Radiance from a light that is asked so many times in the mean, if not just once.

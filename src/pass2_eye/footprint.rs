@@ -10,7 +10,7 @@
 
 use crate::geometry::{SheetId, SurfacePoint};
 use crate::media::Media;
-use crate::optics::Arrival;
+use crate::optics::{Arrival, Interaction};
 use crate::sampling::hash;
 use crate::scene::Scene;
 use crate::spectrum::Line;
@@ -244,9 +244,9 @@ fn follow_main_way(scene: &Scene, eye_media: &Media, raster: Vec2) -> Option<Lan
         let hit = scene.geometry.closest_hit(&ray)?;
         certain &= !scene.geometry.may_meet_moving(&ray, hit.t);
         let arrival = Arrival::new(scene, &ray, &hit, media, None);
-        let interaction = arrival.interact(|| UNDISPERSED);
-        let material = arrival.material();
-        let surface = &hit.surface;
+        let (material, surface) = (arrival.material, &hit.surface);
+        let interaction =
+            if material.has_specular() { arrival.interact(|| UNDISPERSED) } else { Interaction::default() };
         if material.has_diffuse() {
             let normal = facing(surface, ray.direction);
             only_way &= interaction.reflected.is_none() && interaction.refracted.is_none();

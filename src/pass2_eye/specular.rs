@@ -269,6 +269,9 @@ impl<'a> EyeWalk<'a> {
         let rests = self.arrive(&branch, &arrival, sums);
         // The main way ends at the first D.
         branch.main &= !rests;
+        if !arrival.material.has_specular() {
+            return;
+        }
         let pick = self.sample.branch(branch.key);
         let wavelengths = Cell::new(0);
         let interaction = arrival.interact(|| {

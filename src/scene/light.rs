@@ -2,7 +2,7 @@
 
 use crate::geometry::{Bounds, Motion};
 use crate::sampling::{concentric_disc, uniform_sphere};
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec2, Vec3};
 use std::f64::consts::TAU;
 
 /// A source of light. Quantities are per channel.
@@ -100,7 +100,7 @@ impl DiskLight {
     pub fn square(&self) -> QuadLight {
         let (x, y) = self.normal.any_orthonormal_pair();
         let (half_u, half_v) = (x * self.radius, y * self.radius);
-        QuadLight { center: self.center, half_u, half_v, normal: self.normal, radiance: self.radiance }
+        QuadLight::new(self.center, [half_u, half_v], self.normal, self.radiance)
     }
 }
 
@@ -332,9 +332,46 @@ pub struct QuadLight {
     pub normal: Vec3,
     /// Radiance, W·sr⁻¹·m⁻².
     pub radiance: Vec3,
+    /// Unit vectors along both edges, and the edges' lengths.
+    edges: [(DVec3, f64); 2],
+    /// Bound on how far each coordinate of a point of it is from the true surface.
+    error: f32,
 }
 
 impl QuadLight {
+    /// Of its centre, from there to the middles of two edges, perpendicular to each other, and the side that emits.
+    #[must_use]
+    pub fn new(center: Vec3, [half_u, half_v]: [Vec3; 2], normal: Vec3, radiance: Vec3) -> Self {
+        let edge = |half: Vec3| {
+            let length = half.as_dvec3().length();
+            (half.as_dvec3() / length, 2.0 * length)
+        };
+        let edges = [edge(half_u), edge(half_v)];
+        let error = (center.abs() + half_u.abs() + half_v.abs()).max_element() * (4.0 * f32::EPSILON);
+        Self { center, half_u, half_v, normal, radiance, edges, error }
+    }
+
+    /// Unit vectors along both edges, and the edges' lengths.
+    #[inline]
+    #[must_use]
+    pub fn edges(&self) -> [(DVec3, f64); 2] {
+        self.edges
+    }
+
+    /// A point of its surface, of which each coordinate is right to a few roundings.
+    #[inline]
+    #[must_use]
+    pub fn surface_point(&self, point: Vec3) -> LightPoint {
+        LightPoint { point, normal: self.normal, error: self.error }
+    }
+
+    /// A point for a place in the square from -1 to 1.
+    #[inline]
+    #[must_use]
+    pub fn point(&self, place: Vec2) -> LightPoint {
+        self.surface_point(self.center + self.half_u * place.x + self.half_v * place.y)
+    }
+
     /// Area in m².
     #[must_use]
     pub fn area(&self) -> f32 {

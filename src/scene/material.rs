@@ -4,7 +4,8 @@
 //! part.
 
 use super::Texture;
-use glam::{Vec2, Vec3};
+use crate::geometry::TextureCoordinates;
+use glam::Vec3;
 
 /// What a surface is made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -186,8 +187,8 @@ impl Mix {
     /// Both parts with their shares at a surface point.
     #[inline]
     #[must_use]
-    pub fn shares(&self, uv: Vec2) -> [(&Material, f32); 2] {
-        let amount = (self.amount.eval(uv).element_sum() / 3.0).clamp(0.0, 1.0);
+    pub fn shares(&self, at: TextureCoordinates) -> [(&Material, f32); 2] {
+        let amount = (self.amount.eval(at).element_sum() / 3.0).clamp(0.0, 1.0);
         [(&self.parts[0], 1.0 - amount), (&self.parts[1], amount)]
     }
 }
@@ -252,13 +253,13 @@ impl Material {
 
     /// What the eye sees of it without any light: emission and ambient light of the Phong model.
     #[must_use]
-    pub fn glow(&self, uv: Vec2) -> Vec3 {
+    pub fn glow(&self, at: TextureCoordinates) -> Vec3 {
         match self {
             Self::Diffuse { .. } | Self::Mirror { .. } | Self::Metal { .. } | Self::Glass { .. } => {
                 Vec3::ZERO
             }
             Self::Phong(phong) => phong.emission + phong.ambient,
-            Self::Mix(mix) => mix.shares(uv).into_iter().map(|(part, share)| part.glow(uv) * share).sum(),
+            Self::Mix(mix) => mix.shares(at).into_iter().map(|(part, share)| part.glow(at) * share).sum(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Textures: a colour over a surface, constant, checked or from a picture.
 
 use crate::develop::srgb_to_linear;
+use crate::geometry::TextureCoordinates;
 use glam::{Vec2, Vec3};
 use image::{ImageFormat, ImageReader, Limits};
 use std::fmt;
@@ -69,16 +70,15 @@ impl Texture {
     /// The colour at a surface point.
     #[inline]
     #[must_use]
-    pub fn eval(&self, uv: Vec2) -> Vec3 {
+    pub fn eval(&self, at: TextureCoordinates) -> Vec3 {
         match self {
             Self::Constant(color) => *color,
             Self::Checker { colors, size } => {
-                let square = (uv / *size).floor();
-                // Parity of the sum; rem_euclid keeps it right for negative squares.
-                let odd = (square.x + square.y).rem_euclid(2.0) >= 1.0;
-                colors[usize::from(odd)]
+                let square = (at.uv() / *size).floor();
+                let odd = (square.x as i64 ^ square.y as i64) & 1;
+                colors[odd as usize]
             }
-            Self::Image { image, scale } => image.eval(uv / *scale),
+            Self::Image { image, scale } => image.eval(at.uv() / *scale),
         }
     }
 
@@ -226,8 +226,8 @@ mod tests {
     #[test]
     fn a_scaled_picture_is_as_large_as_it_says() {
         let texture = Texture::Image { image: Arc::new(four()), scale: Vec2::new(4.0, 2.0) };
-        assert_eq!(texture.eval(Vec2::new(1.0, 1.5)), Vec3::X);
-        assert_eq!(texture.eval(Vec2::new(3.0, 0.5)), Vec3::ONE);
+        assert_eq!(texture.eval(TextureCoordinates::Uv(Vec2::new(1.0, 1.5))), Vec3::X);
+        assert_eq!(texture.eval(TextureCoordinates::Uv(Vec2::new(3.0, 0.5))), Vec3::ONE);
     }
 
     #[test]

@@ -244,7 +244,8 @@ fn an_instance_is_the_transformed_mesh() {
             let ray = Ray::new(center + random(1, i) * 4.0, uniform_sphere(SamplePoint::new(2, i).get_2d(0)));
             let (a, b) = (instance.closest_hit(&ray), baked.closest_hit(&ray));
             if place == DAffine3::IDENTITY {
-                let place = |hit: nephroid::geometry::Hit| (hit.t, hit.surface.point, hit.surface.uv);
+                let place =
+                    |hit: nephroid::geometry::Hit| (hit.t, hit.surface.point, hit.surface.texture.uv());
                 assert_eq!(a.map(place), b.map(place), "{i}");
                 continue;
             }

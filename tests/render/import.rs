@@ -150,7 +150,7 @@ fn a_base_colour_picture_is_taken_over_and_lies_as_it_did() {
         let Material::Diffuse { albedo } = &scene.materials[0] else { panic!("{:?}", scene.materials[0]) };
         for (x, y, expected) in [(-0.5, 0.5, 1.0), (0.5, 0.5, 0.0), (-0.5, -0.5, 0.503)] {
             let hit = scene.geometry.closest_hit(&Ray::new(Vec3::new(x, y, 3.0), Vec3::NEG_Z)).unwrap();
-            let found = albedo.eval(hit.surface.uv).y;
+            let found = albedo.eval(hit.surface.texture).y;
             // Eight bits of sRGB.
             assert!((found - factor * expected).abs() < 0.004, "{factor} {x} {y}: {found}");
         }

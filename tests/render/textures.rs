@@ -30,7 +30,7 @@ fn textured(objects: Value) -> Value {
 fn color(scene: &Scene, from: Vec3, to: Vec3) -> Vec3 {
     let hit = scene.geometry.closest_hit(&Ray::new(from, (to - from).normalize())).expect("a hit");
     match scene.material_of(hit.object) {
-        Material::Diffuse { albedo } => albedo.eval(hit.surface.uv),
+        Material::Diffuse { albedo } => albedo.eval(hit.surface.texture),
         other => panic!("diffuse: {other:?}"),
     }
 }

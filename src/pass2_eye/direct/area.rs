@@ -2,7 +2,7 @@
 
 use super::spherical_rectangle::SphericalRectangle;
 use super::{Incident, Receiver, short_of};
-use crate::geometry::offset_origin;
+use crate::geometry::offset_distance;
 use crate::sampling::cone_direction;
 use crate::scene::{DiskLight, Light, LightPoint, MeshLight, QuadLight, SphereLight};
 use glam::{DVec3, Vec2, Vec3};
@@ -19,9 +19,9 @@ pub(super) fn from_quad(receiver: &Receiver<'_>, quad: &QuadLight, u: Vec2) -> O
         return None;
     }
     let rectangle = SphericalRectangle::new(quad, from)?;
-    let error = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element() * f32::EPSILON;
-    let target = LightPoint { point: rectangle.sample(u), normal: quad.normal, error: 4.0 * error };
-    towards(receiver, &target, |_, _| Drawn::new(quad.radiance, 1.0 / rectangle.solid_angle))
+    towards(receiver, &quad.surface_point(rectangle.sample(u)), |_, _| {
+        Drawn::new(quad.radiance, 1.0 / rectangle.solid_angle)
+    })
 }
 
 /// Uniform in the solid angle of the square around a near disk, where what falls outside the disk gives
@@ -91,8 +91,7 @@ pub(super) fn towards(
         return None;
     }
     // The shadow ray ends where it is as far before the light as rounding may put the light's surface.
-    let target = offset_origin(light.point, light.error, light.normal, light.normal);
-    let short = (target - light.point).dot(light.normal) / at_light;
+    let short = offset_distance(light.point, light.error, light.normal) / at_light;
     let Drawn { irradiance, pdf } = drawn(at_light, distance2);
     let distance = short_of((distance2.sqrt() - short).max(0.0));
     Some(Incident { direction, distance, irradiance, pdf: Some(pdf) })

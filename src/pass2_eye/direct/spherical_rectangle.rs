@@ -31,12 +31,9 @@ impl SphericalRectangle {
     /// `None` where the point lies in the rectangle's plane.
     pub(super) fn new(quad: &QuadLight, from: Vec3) -> Option<Self> {
         let origin = from.as_dvec3();
-        let (u, v) = (quad.half_u.as_dvec3(), quad.half_v.as_dvec3());
-        let (half_width, half_height) = (u.length(), v.length());
-        let (width, height) = (2.0 * half_width, 2.0 * half_height);
-        let (ax, ay) = (u / half_width, v / half_height);
+        let [(ax, width), (ay, height)] = quad.edges();
         let mut az = ax.cross(ay);
-        let corner = quad.center.as_dvec3() - u - v - origin;
+        let corner = quad.center.as_dvec3() - ax * (0.5 * width) - ay * (0.5 * height) - origin;
         let mut z = corner.dot(az);
         if z > 0.0 {
             z = -z;

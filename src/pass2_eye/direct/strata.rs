@@ -4,7 +4,7 @@
 use super::area::{by_area, towards};
 use super::{Incident, Receiver};
 use crate::sampling::SamplePoint;
-use crate::scene::{Light, LightPoint, LightSampling};
+use crate::scene::{Light, LightSampling};
 use glam::{Vec2, Vec3};
 
 /// How often a stratum whose corners disagree is divided in four.
@@ -65,11 +65,7 @@ impl Strata<'_> {
     fn incident(&self, u: Vec2) -> Option<Incident> {
         match self.light {
             Light::Quad(quad) => {
-                let p = u * 2.0 - 1.0;
-                let point = quad.center + quad.half_u * p.x + quad.half_v * p.y;
-                let largest = (quad.center.abs() + quad.half_u.abs() + quad.half_v.abs()).max_element();
-                let point = LightPoint { point, normal: quad.normal, error: 4.0 * largest * f32::EPSILON };
-                towards(self.receiver, &point, by_area(quad.radiance, quad.area()))
+                towards(self.receiver, &quad.point(u * 2.0 - 1.0), by_area(quad.radiance, quad.area()))
             }
             Light::Disk(disk) => towards(self.receiver, &disk.point(u), by_area(disk.radiance, disk.area())),
             Light::Point { .. }

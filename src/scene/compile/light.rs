@@ -143,12 +143,8 @@ impl Compiler<'_> {
             None => DVec3::Y.cross(normal).try_normalize().unwrap_or(DVec3::X),
         };
         let [width, height] = quad.size;
-        Some(QuadLight {
-            center: center.as_vec3(),
-            half_u: (across * (width / 2.0)).as_vec3(),
-            half_v: (normal.cross(across) * (height / 2.0)).as_vec3(),
-            normal: normal.as_vec3(),
-            radiance: vec3(quad.radiance),
-        })
+        let halves =
+            [across * (width / 2.0), normal.cross(across) * (height / 2.0)].map(|half| half.as_vec3());
+        Some(QuadLight::new(center.as_vec3(), halves, normal.as_vec3(), vec3(quad.radiance)))
     }
 }
