@@ -188,13 +188,17 @@ impl Wanted {
         let width = measured.width;
         let height = measured.errors.len() / width.max(1);
         let variance: Vec<f32> = measured.errors.iter().zip(had).map(|(e, &n)| error(e) * n as f32).collect();
+        let near = |at: usize, end: usize| at.saturating_sub(WINDOW)..(at + WINDOW + 1).min(end);
+        let across = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            variance[y * width..][near(x, width)].iter().sum::<f32>()
+        };
+        let across: Vec<f32> = (0..variance.len()).into_par_iter().map(across).collect();
         let around = |i: usize| {
             let (x, y) = (i % width, i / width);
-            let columns = x.saturating_sub(WINDOW)..(x + WINDOW + 1).min(width);
-            let rows = y.saturating_sub(WINDOW)..(y + WINDOW + 1).min(height);
+            let (columns, rows) = (near(x, width), near(y, height));
             let count = (columns.len() * rows.len()) as f32;
-            let sum: f32 = rows.map(|row| variance[row * width..][columns.clone()].iter().sum::<f32>()).sum();
-            sum / count
+            rows.map(|row| across[row * width + x]).sum::<f32>() / count
         };
         let cost = rays.max(1.0);
         let pixels: Vec<f32> =

@@ -128,24 +128,23 @@ impl PixelSums {
     }
 
     fn means(&self, photon_weight: f32, caustics: Caustics) -> PixelMeans {
-        let per_sample = 1.0 / self.samples.max(1) as f32;
+        let per_sample = self.per_sample();
         let per_path = 1.0 / self.paths.max(1) as f32;
         let per_photon = if photon_weight > 0.0 { 1.0 / photon_weight } else { 0.0 };
         let gain = self.gain * (0.5 * per_sample);
         let irradiance = self.halves.map(|half| half.irradiance * per_photon);
-        let halves = self.halves.map(|half| {
-            let mut means = half.classes;
-            for class in PathClass::ALL {
-                means.0[class as usize] *= match class {
-                    PathClass::Emitted | PathClass::Direct => per_sample,
-                    PathClass::Indirect => per_path,
-                    PathClass::Caustic => match caustics {
-                        Caustics::Photons | Caustics::Forward => per_photon,
-                        Caustics::Backward => per_sample,
-                    },
-                };
-            }
-            means.add(PathClass::Caustic, gain * half.irradiance * per_photon);
+        let factors = PathClass::ALL.map(|class| match class {
+            PathClass::Emitted | PathClass::Direct => per_sample,
+            PathClass::Indirect => per_path,
+            PathClass::Caustic => match caustics {
+                Caustics::Photons | Caustics::Forward => per_photon,
+                Caustics::Backward => per_sample,
+            },
+        });
+        let halves = std::array::from_fn(|half| {
+            let sums = &self.halves[half].classes.0;
+            let mut means = ClassSums(std::array::from_fn(|class| sums[class] * factors[class]));
+            means.add(PathClass::Caustic, gain * irradiance[half]);
             means
         });
         let indirect = self.indirect_of(self.halves.map(|half| half.indirect));
@@ -154,6 +153,10 @@ impl PixelSums {
             half.add(PathClass::Indirect, gain * *indirect);
         }
         means
+    }
+
+    fn per_sample(&self) -> f32 {
+        1.0 / self.samples.max(1) as f32
     }
 
     /// Means of what the paths of each half have found; `None` if there were none. A half without paths is told what the
@@ -169,6 +172,10 @@ impl PixelSums {
 
     /// The class that holds a number that is not finite, if any.
     pub(crate) fn not_finite(&self) -> Option<PathClass> {
+        let of_half = |half: &HalfSums| half.classes.total() + half.irradiance + half.indirect;
+        if (self.gain + of_half(&self.halves[0]) + of_half(&self.halves[1])).is_finite() {
+            return None;
+        }
         PathClass::ALL
             .into_iter()
             .find(|&c| self.halves.iter().any(|h| !h.classes.get(c).is_finite()))
@@ -329,6 +336,16 @@ impl Film {
     #[must_use]
     pub fn raw_image(&self) -> LinearImage {
         self.map(|means| means.total())
+    }
+
+    /// What is emitted to the eye, as it was gathered: [`Film::raw_layer`] without all the others.
+    #[must_use]
+    pub fn emitted(&self) -> Vec<Vec3> {
+        let mean = |pixel: &PixelSums| {
+            let [a, b] = pixel.halves.each_ref().map(|half| half.classes.get(PathClass::Emitted));
+            (a + b) * (0.5 * pixel.per_sample())
+        };
+        self.pixels.par_iter().map(mean).collect()
     }
 
     /// One class, as it was gathered.

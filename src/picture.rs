@@ -100,10 +100,14 @@ impl<'a> Picture<'a> {
     /// Estimated relative squared error of every pixel, by what makes it.
     #[must_use]
     pub fn errors(&self) -> Vec<PixelError> {
-        let image = self.image();
+        self.errors_of(&self.image())
+    }
+
+    /// The same where the image is known.
+    pub(crate) fn errors_of(&self, image: &LinearImage) -> Vec<PixelError> {
         let mean = image.pixels.iter().map(|p| mean_channel(Vec3::from_array(*p))).sum::<f32>();
         let floor = 0.1 * mean / image.pixels.len() as f32;
-        let (around, beside) = (around(&image), beside(&self.film.raw_layer(PathClass::Emitted)));
+        let (around, beside) = (around(image), beside(&self.film.emitted(), self.film.size()));
         let pixels = self.film.means().zip(image.pixels.par_iter().zip(around.into_par_iter().zip(beside)));
         let mut errors: Vec<PixelError> = pixels
             .enumerate()
@@ -217,36 +221,41 @@ impl PixelError {
 const EDGE: f32 = 0.4;
 
 /// The most that any neighbour of a pixel that shows anything shows, by channel.
-fn beside(image: &LinearImage) -> Vec<Vec3> {
-    let (width, height) = (image.width as usize, image.height as usize);
+fn beside(pixels: &[Vec3], (width, height): (usize, usize)) -> Vec<Vec3> {
     let most = |i: usize| {
-        if image.pixels[i] == [0.0; 3] {
+        if pixels[i] == Vec3::ZERO {
             return Vec3::ZERO;
         }
         let (x, y) = (i % width, i / width);
         let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
         let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
         let neighbours = rows.flat_map(|y| columns.clone().map(move |x| y * width + x)).filter(|&j| j != i);
-        neighbours.map(|j| Vec3::from_array(image.pixels[j])).fold(Vec3::ZERO, Vec3::max)
+        neighbours.map(|j| pixels[j]).fold(Vec3::ZERO, Vec3::max)
     };
-    (0..image.pixels.len()).into_par_iter().map(most).collect()
+    (0..pixels.len()).into_par_iter().map(most).collect()
 }
 
 /// What each pixel's neighbours agree on: the least mean of two that lie opposite to each other, by channel.
 fn around(image: &LinearImage) -> Vec<Vec3> {
-    const PAIRS: [(isize, isize); 4] = [(1, 0), (0, 1), (1, 1), (1, -1)];
-    let (width, height) = (image.width as isize, image.height as isize);
-    let at = |x: isize, y: isize| {
-        let inside = (0..width).contains(&x) && (0..height).contains(&y);
-        inside.then(|| Vec3::from_array(image.pixels[(y * width + x) as usize]))
+    let width = image.width as usize;
+    let (pixels, count) = (&image.pixels, image.pixels.len());
+    let mean = |i: usize, apart: usize| {
+        0.5 * (Vec3::from_array(pixels[i - apart]) + Vec3::from_array(pixels[i + apart]))
     };
     let least = |i: usize| {
-        let (x, y) = (i as isize % width, i as isize / width);
-        let means =
-            PAIRS.iter().filter_map(|&(dx, dy)| Some(0.5 * (at(x - dx, y - dy)? + at(x + dx, y + dy)?)));
-        means.reduce(Vec3::min).unwrap_or(Vec3::ZERO)
+        let x = i % width;
+        let (inside, between) = (x > 0 && x + 1 < width, i >= width && i + width < count);
+        match (inside, between) {
+            (true, true) => {
+                let straight = mean(i, 1).min(mean(i, width));
+                straight.min(mean(i, width + 1)).min(mean(i, width - 1))
+            }
+            (true, false) => mean(i, 1),
+            (false, true) => mean(i, width),
+            (false, false) => Vec3::ZERO,
+        }
     };
-    (0..image.pixels.len()).into_par_iter().map(least).collect()
+    (0..count).into_par_iter().map(least).collect()
 }
 
 fn add(mut image: LinearImage, correction: &[Vec3]) -> LinearImage {

@@ -368,7 +368,12 @@ impl Render {
     /// The picture so far.
     #[must_use]
     pub fn image(&self) -> LinearImage {
-        self.picture().image()
+        if self.smoothed_now() { self.preview.clone() } else { self.picture().image() }
+    }
+
+    /// Whether the last round was a milestone, whose smoothing and picture are kept.
+    fn smoothed_now(&self) -> bool {
+        self.smoothing.as_ref().is_some_and(|(rounds, _)| *rounds == self.rounds())
     }
 
     /// The picture at the last of the rounds 1, 2, 3, 4, 6, 8, 12, 16, …: at no cost.

@@ -13,6 +13,7 @@
 //! on rough surfaces or where something moves, have their radiance filtered in the same way, among those whose middles show
 //! the same surface.
 
+mod boxes;
 mod ladder;
 mod segment;
 mod sums;
@@ -90,6 +91,8 @@ struct Sample {
     gain: Vec3,
     /// Radiance of everything else.
     rest: Vec3,
+    /// Radiance of everything, mean over channels.
+    total: f32,
     /// Whether anything is known of the irradiance; where not, neighbours tell it.
     known: bool,
 }
@@ -149,8 +152,7 @@ fn smooth_one(
         return None;
     }
     // Summed in the order of the pixels, whatever the number of threads.
-    let totals: Vec<f32> = film.means().map(|means| mean_channel(means.total())).collect();
-    let sum: f32 = totals.iter().sum();
+    let sum: f32 = samples.iter().map(|sample| sample.total).sum();
     let floor = 0.1 * sum / samples.len() as f32;
     let filtered: Vec<(Segment, Ladder)> = lit_segments(segments, &samples)
         .map(|segment| {
@@ -224,8 +226,9 @@ impl Sample {
             }
             (Gathered::Indirect, false) => (radiance(PathClass::Indirect), Vec3::ONE, true),
         };
-        let rest = means.total() - gain * 0.5 * (irradiance[0] + irradiance[1]);
-        Self { irradiance, gain, rest: rest.max(Vec3::ZERO), known }
+        let total = means.total();
+        let rest = total - gain * 0.5 * (irradiance[0] + irradiance[1]);
+        Self { irradiance, gain, rest: rest.max(Vec3::ZERO), total: mean_channel(total), known }
     }
 }
 

@@ -76,7 +76,8 @@ impl Render {
         } else {
             Picture::new(&self.film, &self.footprints)
         };
-        let errors = picture.errors();
+        let image = picture.image();
+        let errors = picture.errors_of(&image);
         let measured = self.measured(&errors, &self.eye);
         let key = hash(self.scene.render.seed, u64::from(self.rounds()));
         // A round at most doubles what was done before: no single one overruns a limit of time by far.
@@ -84,7 +85,7 @@ impl Render {
         let effort = Effort::decide(&measured, most_shift, key);
         self.effort = if self.even { effort.evened(&self.shares) } else { effort };
         self.error = Some(PixelError::bound(&errors));
-        self.preview = picture.image();
+        self.preview = image;
         self.smoothing = Some((self.film.rounds(), picture.into_smoothing()));
     }
 }

@@ -1,5 +1,6 @@
 //! The ladder of widths over one segment, and the choice between them.
 
+use super::boxes::{Plane, box_sums};
 use super::segment::Segment;
 use super::sums::Sums;
 use super::{Gathered, Sample, mean_channel};
@@ -95,7 +96,7 @@ pub(super) struct Choice {
 struct Filtered {
     halves: [Vec<Vec3>; 2],
     /// The filtered mask of known pixels: 0 where none is within reach.
-    share: Vec<Vec3>,
+    share: Plane<1>,
 }
 
 impl Filtered {
@@ -115,7 +116,7 @@ struct Costs<'a> {
     levels: &'a [Filtered],
     weights: &'a [f32],
     /// 1 where irradiance is known, else 0.
-    mask: &'a [f32],
+    mask: &'a [[f32; 1]],
 }
 
 impl Ladder {
@@ -123,21 +124,21 @@ impl Ladder {
     /// as absolute.
     pub(super) fn climb(segment: &Segment, samples: &[Sample], (gathered, floor): (Gathered, f32)) -> Self {
         let area = segment.size.0 * segment.size.1;
-        let mut mask = vec![0.0_f32; area];
-        let mut raw = [vec![Vec3::ZERO; area], vec![Vec3::ZERO; area]];
+        let mut mask = vec![[0.0_f32]; area];
+        let mut raw: [Plane<3>; 2] = [vec![[0.0; 3]; area], vec![[0.0; 3]; area]];
         for &pixel in &segment.pixels {
             let local = segment.local(pixel);
-            mask[local] = f32::from(u8::from(samples[pixel as usize].known));
+            mask[local] = known(&samples[pixel as usize]);
             for (plane, irradiance) in raw.iter_mut().zip(samples[pixel as usize].irradiance) {
-                plane[local] = irradiance;
+                plane[local] = irradiance.to_array();
             }
         }
         let levels: Vec<Filtered> = widths(gathered)
             .par_iter()
             .with_max_len(1)
-            .map(|level| filter(*level, &raw, &mask, segment.size))
+            .map(|level| filter(*level, &raw, &mask, segment.size.0))
             .collect();
-        let counts = Sums::new(segment.size, mask.iter().map(|&m| f64::from(m)));
+        let counts = Sums::new(segment.size, mask.iter().map(|&[known]| f64::from(known)));
         let even = weights(segment, samples, before_choice(&levels, &counts), floor);
         let costs = Costs { levels: &levels, weights: &even, mask: &mask };
         let sums: Vec<Cost> = (0..levels.len())
@@ -163,6 +164,11 @@ impl Ladder {
     }
 }
 
+/// A pixel of the mask: 1 where irradiance is known, else 0.
+fn known(sample: &Sample) -> [f32; 1] {
+    [f32::from(u8::from(sample.known))]
+}
+
 /// A part of the irradiance over a segment, at widths that were chosen before: filters are linear, so that parts add up to
 /// the whole. `value` and `level` are by pixel of the picture; tells the result of each.
 pub(super) fn filter_part(
@@ -172,19 +178,19 @@ pub(super) fn filter_part(
     mut tell: impl FnMut(usize, Vec3),
 ) {
     let area = segment.size.0 * segment.size.1;
-    let (mut mask, mut raw) = (vec![0.0_f32; area], vec![Vec3::ZERO; area]);
+    let (mut mask, mut raw) = (vec![[0.0_f32]; area], vec![[0.0; 3]; area]);
     for &pixel in &segment.pixels {
         let local = segment.local(pixel);
-        mask[local] = f32::from(u8::from(samples[pixel as usize].known));
-        raw[local] = value[pixel as usize];
+        mask[local] = known(&samples[pixel as usize]);
+        raw[local] = value[pixel as usize].to_array();
     }
     for (number, width) in LEVELS.iter().enumerate() {
         let chosen = || segment.pixels.iter().filter(|&&pixel| usize::from(level[pixel as usize]) == number);
         if chosen().next().is_none() {
             continue;
         }
-        let share = shares(*width, &mask, segment.size);
-        let filtered = filter_plane(*width, raw.clone(), &share, segment.size);
+        let share = box_sums(&mask, width.boxes, segment.size.0);
+        let filtered = filter_plane(*width, &raw, &share, segment.size.0);
         chosen().for_each(|&pixel| tell(pixel as usize, filtered[segment.local(pixel)]));
     }
 }
@@ -236,7 +242,7 @@ impl Costs<'_> {
     /// Unbiased estimates for a pixel, relative: of what a width blurs away beyond one two steps finer, and of the noise it
     /// leaves.
     fn at(&self, level: usize, i: usize) -> (f32, f32) {
-        let weight = self.weights[i] * self.mask[i];
+        let weight = self.weights[i] * self.mask[i][0];
         if weight <= 0.0 {
             return (0.0, 0.0);
         }
@@ -281,7 +287,7 @@ fn choose(
                 let level = choose_level((costs, counts, windows), (x, rows.start));
                 for i in block.filter(|&i| weights[i] > 0.0) {
                     // Where nothing is known, the next width that reaches something.
-                    let reaches = |&level: &usize| levels[level].share[i].x > 0.0;
+                    let reaches = |&level: &usize| levels[level].share[i][0] > 0.0;
                     let level = (level..levels.len()).find(reaches).unwrap_or(level);
                     let irradiance = levels[level].mean(i);
                     choices[i - rows.start * width] =
@@ -332,51 +338,15 @@ fn choose_level((costs, counts, windows): (&[Cost], &Sums, &[usize]), at: (usize
 
 /// Filters both halves within the mask, and to where it reaches: sums of masked values over sums of the mask, so that nothing is lost
 /// at the segment's border.
-fn filter(level: Level, raw: &[Vec<Vec3>; 2], mask: &[f32], size: (usize, usize)) -> Filtered {
-    let share = shares(level, mask, size);
-    Filtered { halves: raw.clone().map(|plane| filter_plane(level, plane, &share, size)), share }
+fn filter(level: Level, raw: &[Plane<3>; 2], mask: &[[f32; 1]], width: usize) -> Filtered {
+    let share = box_sums(mask, level.boxes, width);
+    Filtered { halves: raw.each_ref().map(|plane| filter_plane(level, plane, &share, width)), share }
 }
 
-/// The filtered mask.
-fn shares(level: Level, mask: &[f32], size: (usize, usize)) -> Vec<Vec3> {
-    let mut share: Vec<Vec3> = mask.iter().map(|&m| Vec3::splat(m)).collect();
-    level.boxes.iter().for_each(|&b| box_filter(&mut share, b, size));
-    share
-}
-
-fn filter_plane(level: Level, mut plane: Vec<Vec3>, share: &[Vec3], size: (usize, usize)) -> Vec<Vec3> {
-    level.boxes.iter().for_each(|&b| box_filter(&mut plane, b, size));
-    for (value, share) in plane.iter_mut().zip(share) {
-        *value = if share.x > 0.0 { *value / share.x } else { Vec3::ZERO };
-    }
-    plane
-}
-
-/// Running sums over 2 `half` + 1 pixels across, then down (not divided by their number).
-fn box_filter(plane: &mut [Vec3], half: usize, (width, height): (usize, usize)) {
-    let mut line = vec![Vec3::ZERO; width.max(height)];
-    for y in 0..height {
-        running_sum(plane, &mut line[..width], half, |x| y * width + x);
-    }
-    for x in 0..width {
-        running_sum(plane, &mut line[..height], half, |y| y * width + x);
-    }
-}
-
-fn running_sum(plane: &mut [Vec3], line: &mut [Vec3], half: usize, at: impl Fn(usize) -> usize) {
-    let n = line.len();
-    for (k, value) in line.iter_mut().enumerate() {
-        *value = plane[at(k)];
-    }
-    // Carried on in f64: what a bright pixel leaves behind when it is taken away is far below f32's rounding.
-    let mut sum = line[..half.min(n)].iter().map(|v| v.as_dvec3()).sum::<glam::DVec3>();
-    for k in 0..n {
-        if k + half < n {
-            sum += line[k + half].as_dvec3();
-        }
-        plane[at(k)] = sum.as_vec3();
-        if k >= half {
-            sum -= line[k - half].as_dvec3();
-        }
-    }
+fn filter_plane(level: Level, plane: &[[f32; 3]], share: &[[f32; 1]], width: usize) -> Vec<Vec3> {
+    let sums = box_sums(plane, level.boxes, width);
+    let mean = |(sum, &[share]): (&[f32; 3], &[f32; 1])| {
+        if share > 0.0 { Vec3::from_array(*sum) / share } else { Vec3::ZERO }
+    };
+    sums.iter().zip(share).map(mean).collect()
 }

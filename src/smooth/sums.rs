@@ -9,13 +9,18 @@ pub(super) struct Sums {
 
 impl Sums {
     /// Of values row by row.
-    pub(super) fn new((width, height): (usize, usize), values: impl Iterator<Item = f64>) -> Self {
+    pub(super) fn new((width, height): (usize, usize), mut values: impl Iterator<Item = f64>) -> Self {
         let stride = width + 1;
         let mut table = vec![0.0; stride * (height + 1)];
-        for (i, value) in values.enumerate() {
-            let (x, y) = (i % width, i / width);
-            let here = (y + 1) * stride + x + 1;
-            table[here] = value + table[here - 1] + table[here - stride] - table[here - stride - 1];
+        let (mut above, mut rows) = table.split_at_mut(stride);
+        while let Some((row, below)) = rows.split_at_mut_checked(stride) {
+            let mut left = 0.0;
+            let corners = above.windows(2).zip(&mut row[1..]).zip(&mut values);
+            for ((above, corner), value) in corners {
+                left = value + left + above[1] - above[0];
+                *corner = left;
+            }
+            (above, rows) = (row, below);
         }
         Self { width, height, table }
     }
