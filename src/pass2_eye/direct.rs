@@ -12,6 +12,7 @@ use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
 mod area;
+mod bilinear;
 mod spherical_rectangle;
 mod strata;
 

@@ -375,7 +375,7 @@ impl QuadLight {
     /// Area in m².
     #[must_use]
     pub fn area(&self) -> f32 {
-        4.0 * self.half_u.length() * self.half_v.length()
+        (self.edges[0].1 * self.edges[1].1) as f32
     }
 
     /// The corners in order around the outline.

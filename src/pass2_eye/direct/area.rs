@@ -1,5 +1,6 @@
 //! Pass 2, `LD`: sampled points of lights that have a surface.
 
+use super::bilinear::Bilinear;
 use super::spherical_rectangle::SphericalRectangle;
 use super::{Incident, Receiver, short_of};
 use crate::geometry::offset_distance;
@@ -11,17 +12,28 @@ use std::f64::consts::PI;
 /// Rounding of a shadow ray's end, in ulps of the largest coordinate.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
-/// A direction to the rectangle uniform in solid angle, so that near and slanting lights are no noisier than
-/// the cosine at the receiver.
+/// A direction to the rectangle. What scatters evenly draws it in proportion to the light that it would get from there: over a
+/// far rectangle by what its corners give, over a near one uniform in solid angle but for the cosine toward the corners. Other
+/// surfaces draw it uniform in solid angle.
 pub(super) fn from_quad(receiver: &Receiver<'_>, quad: &QuadLight, u: Vec2) -> Option<Incident> {
     let from = receiver.surface.point;
     if (from - quad.center).dot(quad.normal) <= 0.0 {
         return None;
     }
+    let bsdf = receiver.bsdf;
+    let normal = bsdf.albedo().map(|_| bsdf.shading);
+    if let Some(corners) = normal.and_then(|normal| Bilinear::of_far(quad, from, normal)) {
+        let (place, density) = corners.sample(u)?;
+        let drawn = by_area(quad.radiance, quad.area() / density);
+        return towards(receiver, &quad.point(place * 2.0 - 1.0), drawn);
+    }
     let rectangle = SphericalRectangle::new(quad, from)?;
-    towards(receiver, &quad.surface_point(rectangle.sample(u)), |_, _| {
-        Drawn::new(quad.radiance, 1.0 / rectangle.solid_angle)
-    })
+    let (u, density) = match normal {
+        Some(normal) => rectangle.cosines(normal).sample(u)?,
+        None => (u, 1.0),
+    };
+    let drawn = |_, _| Drawn::new(quad.radiance, density / rectangle.solid_angle);
+    towards(receiver, &quad.surface_point(rectangle.sample(u)), drawn)
 }
 
 /// Uniform in the solid angle of the square around a near disk, where what falls outside the disk gives

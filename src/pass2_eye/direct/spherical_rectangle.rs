@@ -1,5 +1,6 @@
 //! Uniform sampling of the solid angle of a rectangle (Ureña, Fajardo and King 2013).
 
+use super::bilinear::Bilinear;
 use crate::scene::QuadLight;
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::TAU;
@@ -70,6 +71,20 @@ impl SphericalRectangle {
             solid_angle = width * height * -z / (distance2 * distance2.sqrt());
         }
         Some(Self { origin, axes: [ax, ay, az], x, y, z, b, k, solid_angle: solid_angle as f32 })
+    }
+
+    /// Cosines toward the corners from a surface with this normal, as a density over the square that is drawn from.
+    pub(super) fn cosines(&self, normal: Vec3) -> Bilinear {
+        /// In a corner that the surface does not see, so that no point that it sees is missed.
+        const LEAST: f64 = 0.1;
+        let normal = normal.as_dvec3();
+        let [x, y, z] = self.axes.map(|axis| axis.dot(normal));
+        let corner = |i: usize, j: usize| {
+            let (u, v) = (self.x[i], self.y[j]);
+            let distance = (u * u + v * v + self.z * self.z).sqrt();
+            ((x * u + y * v + z * self.z) / distance).max(LEAST) as f32
+        };
+        Bilinear([corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)])
     }
 
     /// A point of the rectangle, uniform in solid angle for `u` uniform in the unit square.

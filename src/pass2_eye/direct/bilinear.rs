@@ -1,0 +1,95 @@
+//! Sampling of the unit square by a density that follows what is known at its corners (Heitz, *Can't Invert the CDF? The
+//! Triangle-Cut Parameterization*, 2020, and Pharr, Jakob and Humphreys, *Physically Based Rendering*, 4th ed., 6.5.5).
+
+use crate::scene::QuadLight;
+use glam::{Vec2, Vec3};
+
+/// A density that is linear along each edge between its values at (0, 0), (1, 0), (0, 1) and (1, 1), up to a factor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bilinear(pub(super) [f32; 4]);
+
+/// A rectangle whose distance is this many times its diagonal, or more, is far: the light of its points falls off almost
+/// evenly from corner to corner.
+const FAR: f32 = 4.0;
+
+impl Bilinear {
+    /// The irradiance that the points of a far rectangle give to a surface with a normal: the height over the surface's plane
+    /// over the distance to the fourth. `None` of a near one.
+    pub(super) fn of_far(quad: &QuadLight, from: Vec3, normal: Vec3) -> Option<Self> {
+        let to = quad.center - from;
+        let (u, v) = (quad.half_u, quad.half_v);
+        let spread = u.length_squared() + v.length_squared();
+        let distance2 = to.length_squared() + spread;
+        if distance2 < FAR * FAR * 4.0 * spread {
+            return None;
+        }
+        let (along_u, along_v) = (2.0 * to.dot(u) / distance2, 2.0 * to.dot(v) / distance2);
+        let (height, rise_u, rise_v) = (to.dot(normal), u.dot(normal), v.dot(normal));
+        let corner = |x: f32, y: f32| {
+            let distance2 = 1.0 + x * along_u + y * along_v;
+            (height + x * rise_u + y * rise_v).max(0.0) / (distance2 * distance2)
+        };
+        Some(Self([corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)]))
+    }
+
+    /// The point for `u` uniform in the unit square, and the density there; `None` if all is dark.
+    pub(super) fn sample(&self, u: Vec2) -> Option<(Vec2, f32)> {
+        let [a, b, c, d] = self.0;
+        let sum = a + b + c + d;
+        if sum <= 0.0 {
+            return None;
+        }
+        let y = linear(u.y, a + b, c + d);
+        let (left, right) = (a + (c - a) * y, b + (d - b) * y);
+        let x = linear(u.x, left, right);
+        let density = 4.0 * (left + (right - left) * x) / sum;
+        (density > 0.0).then_some((Vec2::new(x, y), density))
+    }
+}
+
+/// Inverts the integral of the density that goes from `a` at 0 to `b` at 1.
+fn linear(u: f32, a: f32, b: f32) -> f32 {
+    let root = (a * a + u * (b * b - a * a)).max(0.0).sqrt();
+    (u * (a + b) / (a + root).max(f32::MIN_POSITIVE)).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::SamplePoint;
+
+    /// Over a stratified set of points the mean of any f/density is the integral of f, here of 1, x and xy; with 65,536 points
+    /// of a scrambled net the deviation is far below 1e-3.
+    #[test]
+    fn samples_have_the_density_that_is_told() {
+        for corners in
+            [[1.0, 1.0, 1.0, 1.0], [0.1, 2.0, 0.5, 4.0], [0.0, 1.0, 0.0, 3.0], [0.0, 0.0, 1.0, 2.0]]
+        {
+            let n = 65_536;
+            let mut sums = [0.0_f64; 3];
+            for i in 0..n {
+                let Some((p, density)) = Bilinear(corners).sample(SamplePoint::new(5, i).get_2d(0)) else {
+                    continue;
+                };
+                let (x, y, density) = (f64::from(p.x), f64::from(p.y), f64::from(density));
+                let here = corner_value(&corners, p) / density;
+                sums.iter_mut().zip([here, x * here, x * y * here]).for_each(|(sum, value)| *sum += value);
+            }
+            let [a, b, c, d] = corners.map(f64::from);
+            let of_x = (a + 2.0 * b + c + 2.0 * d) / 12.0;
+            let of_xy = (a + 2.0 * b + 2.0 * c + 4.0 * d) / 36.0;
+            let expected = [(a + b + c + d) / 4.0, of_x, of_xy];
+            for (sum, expected) in sums.iter().zip(expected) {
+                let mean = sum / f64::from(n);
+                assert!((mean - expected).abs() < 1e-3 * expected, "{corners:?}: {mean} {expected}");
+            }
+        }
+        assert_eq!(Bilinear([0.0; 4]).sample(Vec2::splat(0.5)), None);
+    }
+
+    fn corner_value([a, b, c, d]: &[f32; 4], p: Vec2) -> f64 {
+        let low = f64::from(*a) + f64::from(b - a) * f64::from(p.x);
+        let high = f64::from(*c) + f64::from(d - c) * f64::from(p.x);
+        low + (high - low) * f64::from(p.y)
+    }
+}
