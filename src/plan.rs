@@ -311,7 +311,7 @@ impl Plan {
         } else {
             (
                 "one shadow ray per light to a sampled point",
-                "quads and spheres are sampled by solid angle, other lights by area; Owen-scrambled Sobol",
+                "quads are sampled by the light they give, spheres by solid angle, other lights by area; Owen-scrambled Sobol",
             )
         };
         self.decide("direct light", true, choice, reason);

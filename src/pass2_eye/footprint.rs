@@ -117,24 +117,19 @@ impl Footprints {
 
     fn between_corners(scene: &Scene, eye_media: &Media) -> Vec<Option<Footprint>> {
         let (width, height) = (scene.image.width as usize, scene.image.height as usize);
-        let corners: Vec<Vec<Option<Landing>>> = (0..height + 1)
-            .into_par_iter()
-            .with_max_len(1)
-            .map(|y| (0..=width).map(|x| land(scene, eye_media, Vec2::new(x as f32, y as f32))).collect())
-            .collect();
-        let rows: Vec<Vec<Option<Footprint>>> = (0..height)
-            .into_par_iter()
-            .map(|y| {
-                let (above, below) = (&corners[y], &corners[y + 1]);
-                let pixel = |x: usize| {
-                    let around = [above[x]?, above[x + 1]?, below[x + 1]?, below[x]?];
-                    let middle = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                    Footprint::between(&around, || land(scene, eye_media, middle))
-                };
-                (0..width).map(pixel).collect()
-            })
-            .collect();
-        rows.concat()
+        // One more across and down than there are pixels.
+        let stride = width + 1;
+        let corner = |i: usize| land(scene, eye_media, Vec2::new((i % stride) as f32, (i / stride) as f32));
+        let corners: Vec<Option<Landing>> =
+            (0..stride * (height + 1)).into_par_iter().with_max_len(stride).map(corner).collect();
+        let pixel = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            let at = y * stride + x;
+            let around = [corners[at]?, corners[at + 1]?, corners[at + stride + 1]?, corners[at + stride]?];
+            let middle = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+            Footprint::between(&around, || land(scene, eye_media, middle))
+        };
+        (0..width * height).into_par_iter().map(pixel).collect()
     }
 
     /// What a pixel shows, if it is one thing: its footprint or, away from borders, what its middle shows.

@@ -167,13 +167,12 @@ fn trace_pixel(
         let seed = pixel_seed(context.scene.render.seed, x, y, half);
         // Those that look photons up lie anywhere in the round: a fixed place would be a fixed part of the sequence, and
         // so of the pixel.
-        let turn = || (hash(seed, u64::from(before.samples)) % u64::from(count)) as u32;
-        let turn = if gathering < count { turn() } else { 0 };
+        let turn = if gathering > 0 { hash(seed, u64::from(before.samples)) % u64::from(count) } else { 0 };
         for i in 0..count {
             let sample = next_sample(seed, before, (i, paths));
             walk.goes_on = i < paths;
             let raster = Vec2::new(x as f32, y as f32) + sample.get_2d(0);
-            let looks_up = gathering == count || (gathering > 0 && (i + turn) % count < gathering);
+            let looks_up = gathering > 0 && (i + turn as u32) % count < gathering;
             let lookups = if looks_up { lookups } else { Lookups::Nowhere };
             let view = footprint.map(|f| f.view);
             walk.start(half as usize, sample, lookups, view);
