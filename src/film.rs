@@ -339,8 +339,7 @@ impl Film {
     }
 
     /// What is emitted to the eye, as it was gathered: [`Film::raw_layer`] without all the others.
-    #[must_use]
-    pub fn emitted(&self) -> Vec<Vec3> {
+    pub(crate) fn emitted(&self) -> Vec<Vec3> {
         let mean = |pixel: &PixelSums| {
             let [a, b] = pixel.halves.each_ref().map(|half| half.classes.get(PathClass::Emitted));
             (a + b) * (0.5 * pixel.per_sample())

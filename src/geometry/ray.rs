@@ -133,6 +133,7 @@ mod tests {
             assert!(height(up) >= f64::from(error), "{scale}: {}", height(up));
             assert!(height(down) <= -f64::from(error), "{scale}: {}", height(down));
             assert!(height(up) < 20.0 * f64::from(error), "{scale}: moved too far");
+            assert!(height(up) <= f64::from(offset_distance(point, error, normal)), "{scale}: not bounded");
         }
     }
 }
